@@ -1,0 +1,1 @@
+"""The autopilot: control law, its design, and the vehicle that ground stations see."""

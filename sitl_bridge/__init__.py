@@ -1,0 +1,1 @@
+"""The plant (`sitl_bridge.plant`) and what both processes share: vehicle description, frames, MAVLink."""

@@ -1,0 +1,142 @@
+"""The only place where ENU/FLU meets NED/FRD, where metres meet degrees, and SI meets wire units.
+
+Inside the code the world is ENU with z up, the body FLU, SI units. On the wire MAVLink wants NED/FRD,
+degrees times 1e7, gauss, hPa, millimetres and centimetres. Quaternions are (w, x, y, z) and rotate
+body vectors into the world.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+Triple = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+# World Geodetic System 1984: semi-major axis (m) and first eccentricity squared.
+WGS84_SEMI_MAJOR_AXIS = 6378137.0
+WGS84_ECCENTRICITY_SQUARED = 6.69437999014e-3
+
+# Wire units: multiply an SI value to get the integer or float field of a message.
+DEG_E7_PER_DEG = 1e7
+MILLIMETRES_PER_METRE = 1e3
+CENTIMETRES_PER_METRE = 1e2
+CENTIDEGREES_PER_RADIAN = 100.0 * 180.0 / math.pi
+MICROSECONDS_PER_SECOND = 1e6
+HECTOPASCALS_PER_PASCAL = 1e-2
+GAUSS_PER_TESLA = 1e4
+
+_HALF = math.sqrt(0.5)
+
+
+def enu_to_ned(v: Triple) -> Triple:
+    """World vector, ENU to NED; its own inverse."""
+    return (v[1], v[0], -v[2])
+
+
+def flu_to_frd(v: Triple) -> Triple:
+    """Body vector, FLU to FRD; its own inverse."""
+    return (v[0], -v[1], -v[2])
+
+
+def attitude_to_ned_frd(q: Quaternion) -> Quaternion:
+    """Attitude (FLU to ENU) as MAVLink has it (FRD to NED): C·R·D as a product of quaternions.
+
+    C turns by 180 degrees about the bisector of east and north, D by 180 degrees about the body's x.
+    The result has w >= 0.
+    """
+    w, x, y, z = q
+    out = (-_HALF * (w + z), -_HALF * (x + y), _HALF * (y - x), _HALF * (z - w))
+    return out if out[0] >= 0.0 else (-out[0], -out[1], -out[2], -out[3])
+
+
+attitude_to_enu_flu = (
+    attitude_to_ned_frd  # C and D are their own inverses, so the same product serves both ways
+)
+
+
+def rotate(q: Quaternion, v: Triple) -> Triple:
+    """Rotate a body vector into the world by a unit quaternion."""
+    w, x, y, z = q
+    tx, ty, tz = 2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )
+
+
+def rotate_inverse(q: Quaternion, v: Triple) -> Triple:
+    """Rotate a world vector into the body by a unit quaternion."""
+    return rotate((q[0], -q[1], -q[2], -q[3]), v)
+
+
+def euler_from_quaternion(q: Quaternion) -> Triple:
+    """Roll, pitch, yaw in rad, for R = Rz(yaw)·Ry(pitch)·Rx(roll)."""
+    w, x, y, z = q
+    return (
+        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
+        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    )
+
+
+def quaternion_from_euler(euler: Triple) -> Quaternion:
+    """Unit quaternion from roll, pitch, yaw in rad, for R = Rz(yaw)·Ry(pitch)·Rx(roll)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in euler)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def heading_from_yaw(yaw: float) -> float:
+    """Compass heading (rad, clockwise from north, -pi..pi) from ENU yaw (anticlockwise from east)."""
+    return math.remainder(math.pi / 2 - yaw, 2 * math.pi)
+
+
+yaw_from_heading = heading_from_yaw  # the same reflection serves both ways
+
+
+class Geodetic(NamedTuple):
+    """WGS 84 latitude and longitude in degrees, altitude in m above mean sea level."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+
+
+class LocalOrigin:
+    """The tangent plane at home: ENU metres to latitude, longitude and altitude, and back.
+
+    Equirectangular about home, with the ellipsoid's radii of curvature there; height along the plumb line.
+    """
+
+    def __init__(self, latitude: float, longitude: float, altitude: float) -> None:
+        self.home = Geodetic(latitude, longitude, altitude)
+        sine = math.sin(math.radians(latitude))
+        curvature = 1.0 - WGS84_ECCENTRICITY_SQUARED * sine * sine
+        normal = WGS84_SEMI_MAJOR_AXIS / math.sqrt(curvature)
+        meridional = normal * (1.0 - WGS84_ECCENTRICITY_SQUARED) / curvature
+        self._degrees_per_metre_north = math.degrees(1.0 / (meridional + altitude))
+        self._degrees_per_metre_east = math.degrees(
+            1.0 / ((normal + altitude) * math.cos(math.radians(latitude)))
+        )
+
+    def geodetic(self, position: Triple) -> Geodetic:
+        """Position in ENU metres from home, as latitude and longitude (deg) and altitude (m)."""
+        return Geodetic(
+            self.home.latitude + position[1] * self._degrees_per_metre_north,
+            self.home.longitude + position[0] * self._degrees_per_metre_east,
+            self.home.altitude + position[2],
+        )
+
+    def local(self, point: Geodetic) -> Triple:
+        """Latitude and longitude (deg) and altitude (m) as ENU metres from home."""
+        return (
+            (point.longitude - self.home.longitude) / self._degrees_per_metre_east,
+            (point.latitude - self.home.latitude) / self._degrees_per_metre_north,
+            point.altitude - self.home.altitude,
+        )

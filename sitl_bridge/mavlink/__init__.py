@@ -1,0 +1,1 @@
+"""Bytes <-> messages, and the links that carry them. No physics."""

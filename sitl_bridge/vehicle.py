@@ -1,0 +1,301 @@
+"""The vehicle description: airframe, rotors, cable, load, start and surroundings, from one TOML file.
+
+Both processes read the same description, so there is no second copy of any figure. Units are SI,
+the world is ENU with z up, the body FLU; angles are in radians.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+import annotated_types
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+
+Vector = tuple[float, float, float]
+Model = TypeVar("Model", bound="Section")
+
+
+def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> Any:
+    """Declare a field with its unit and allowed range; both appear in messages about a faulty file."""
+    return Field(default, description=description, json_schema_extra={"unit": unit}, **bounds)
+
+
+class Section(BaseModel):
+    """A table of the description: unknown keys and values that are not finite are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Airframe(Section):
+    mass: float = quantity("kg", "m_v, of the vehicle without load", gt=0, le=1e4)
+    inertia: Annotated[
+        tuple[
+            Annotated[float, Field(gt=0, le=1e5)],
+            Annotated[float, Field(gt=0, le=1e5)],
+            Annotated[float, Field(gt=0, le=1e5)],
+        ],
+        Field(description="principal moments of inertia, body axes", json_schema_extra={"unit": "kg m²"}),
+    ]
+
+
+class Rotor(Section):
+    position: Vector = quantity("m", "of the hub, body FLU, from the centre of mass")
+    direction: Literal["cw", "ccw"] = quantity("-", "seen from above; ccw gives a reaction torque about -z")
+    thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
+    torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
+    max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
+
+
+class Cable(Section):
+    stiffness: float = quantity("N/m", "k_a of eq. 9", gt=0, le=1e6)
+    damping: float = quantity("N s/m", "c_a of eq. 9", 0.0, ge=0, le=1e5)
+    rest_length: float = quantity("m", "l_0 of eq. 9", gt=0, le=1e3)
+    model: Literal["two-way", "tension-only"] = quantity(
+        "-",
+        "two-way also pushes below its rest length (the paper's); tension-only never does",
+        "tension-only",
+    )
+
+
+class Load(Section):
+    mass: float = quantity("kg", "m_p", gt=0, le=1e4)
+
+
+class Initial(Section):
+    """Start state. Without a vehicle position, the vehicle hangs above the load at the equilibrium length."""
+
+    load_position: Vector = quantity("m", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_position: Vector | None = quantity("m", "world ENU", None)
+    load_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    attitude: Vector = quantity("rad", "roll, pitch, yaw (about X, Y, Z; R = Rz Ry Rx)", (0.0, 0.0, 0.0))
+    body_rates: Vector = quantity("rad/s", "p, q, r, body FLU", (0.0, 0.0, 0.0))
+
+
+class Disturbance(Section):
+    force_std: float = quantity("N", "standard deviation on each axis of a white force", 0.0, ge=0, le=1e4)
+    hold_time: float = quantity("s", "each draw of the white force is held so long", 0.01, gt=0, le=10)
+    acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that the white force acts on", "both")
+
+
+class Loop(Section):
+    delay_ticks: int = quantity("ticks", "the plant applies each command so many ticks later", 0, ge=0, le=64)
+
+
+class Home(Section):
+    """Where the world's origin lies; Zurich by default, as PX4's own simulator has it."""
+
+    latitude: float = quantity("deg", "WGS 84", 47.397742, ge=-89, le=89)
+    longitude: float = quantity("deg", "WGS 84", 8.545594, ge=-180, le=180)
+    altitude: float = quantity("m", "above mean sea level", 488.0, ge=-500, le=9000)
+
+
+class Vehicle(Section):
+    """One vehicle, complete: what the plant simulates and what the autopilot is designed for."""
+
+    name: str = quantity("-", "short name", min_length=1)
+    description: str = quantity("-", "one line, with where the figures come from", "")
+    gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
+    airframe: Airframe
+    rotors: tuple[Rotor, ...] = quantity(
+        "rotors", "in the order of the actuator controls", min_length=4, max_length=16
+    )
+    cable: Cable
+    load: Load
+    initial: Initial = Initial()
+    disturbance: Disturbance = Disturbance()
+    loop: Loop = Loop()
+    home: Home = Home()
+
+    @model_validator(mode="after")
+    def _can_hover(self) -> Vehicle:
+        available = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in self.rotors)
+        if available <= self.hover_thrust:
+            raise ValueError(
+                f"rotors give {available:.4g} N at full speed, hovering takes {self.hover_thrust:.4g} N"
+            )
+        if self.initial.vehicle_position == self.initial.load_position:
+            raise ValueError("initial.vehicle_position equals initial.load_position: no cable direction")
+        return self
+
+    @property
+    def hover_thrust(self) -> float:
+        """Total thrust that carries vehicle and load, N (eq. 19)."""
+        return (self.airframe.mass + self.load.mass) * self.gravity
+
+    @property
+    def hover_length(self) -> float:
+        """Cable length at the hover equilibrium, m (eq. 17, corrected: l_0 + m_p g / k_a)."""
+        return self.cable.rest_length + self.load.mass * self.gravity / self.cable.stiffness
+
+    @property
+    def initial_vehicle_position(self) -> Vector:
+        """Where the vehicle starts, m, world ENU: as given, or in equilibrium above the load."""
+        if self.initial.vehicle_position is not None:
+            return self.initial.vehicle_position
+        x, y, z = self.initial.load_position
+        return (x, y, z + self.hover_length)
+
+
+class DescriptionError(ValueError):
+    """A faulty description; `faults` has one line for each fault."""
+
+    def __init__(self, source: str, faults: list[str]) -> None:
+        self.source = source
+        self.faults = faults
+        super().__init__("\n".join(f"{source}: {fault}" for fault in faults))
+
+
+def shipped(folder: Any) -> list[str]:
+    """Names of the TOML files in a resource folder, without the suffix."""
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def vehicle_names() -> list[str]:
+    """Names of the vehicles that come with the package."""
+    return shipped(resources.files(__package__) / "vehicles")
+
+
+def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str, Any]]:
+    """Read a shipped TOML file by name, or any by path; returns (source for messages, content).
+
+    Raises DescriptionError when there is no such file or it is not TOML.
+    """
+    is_path = name_or_file.endswith(".toml") or "/" in name_or_file
+    entry = Path(name_or_file) if is_path else folder / f"{name_or_file}.toml"
+    try:
+        text = entry.read_text(encoding="utf-8")
+        return name_or_file, tomllib.loads(text)
+    except FileNotFoundError:
+        known = ", ".join(shipped(folder))
+        raise DescriptionError(
+            name_or_file, [f"no such {kind}; expected one of {known}, or the path of a .toml file"]
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(name_or_file, [f"not valid TOML: {error}"]) from None
+
+
+def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
+    """Load a vehicle by shipped name or path, with `KEY=VALUE` overrides (`cable.rest_length=10`).
+
+    Raises DescriptionError, with one line for each fault.
+    """
+    source, content = read_toml(name_or_file, resources.files(__package__) / "vehicles", "vehicle")
+    for override in overrides:
+        apply_override(content, override)
+    return validated(Vehicle, content, source)
+
+
+def apply_override(content: dict[str, Any], override: str) -> None:
+    """Set one value of nested tables from `table.key=VALUE`, VALUE being TOML or a bare word."""
+    key, equals, text = override.partition("=")
+    path = key.strip().split(".")
+    if not equals or not all(path):
+        raise DescriptionError("--set", [f"{override!r}: expected KEY=VALUE, as in cable.rest_length=10"])
+    try:
+        value: Any = tomllib.loads(f"value = {text.strip()}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    target: Any = content
+    for step, following in zip(path, [*path[1:], None], strict=True):
+        place: Any = step
+        if isinstance(target, list):
+            if not step.isdigit() or int(step) >= len(target):
+                raise DescriptionError("--set", [f"{key}: {step!r} is no index of a list of {len(target)}"])
+            place = int(step)
+        elif not isinstance(target, dict):
+            raise DescriptionError("--set", [f"{key}: {step!r} lies below a value that is not a table"])
+        if following is None:
+            target[place] = value
+        else:
+            target = target[place] if isinstance(target, list) else target.setdefault(place, {})
+
+
+def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
+    """Validate a parsed file against its model; raises DescriptionError with a line for each fault."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        faults = error.errors()
+        # A list that seems short only because one of its entries is at fault is no fault of its own.
+        followed = {fault["loc"][:1] for fault in faults if len(fault["loc"]) > 1}
+        own = [f for f in faults if not (f["type"] == "too_short" and f["loc"] in followed)]
+        raise DescriptionError(source, [_fault_line(model, fault) for fault in own]) from None
+
+
+def _fault_line(model: type[BaseModel], fault: Any) -> str:
+    """One line for one fault: key, value, unit, allowed range."""
+    where = ".".join(str(part) for part in fault["loc"])
+    field = _field_at(model, fault["loc"])
+    unit = _unit(field)
+    problem = fault["msg"].removeprefix("Value error, ")
+    if fault["type"] == "missing":
+        return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
+    if fault["type"] == "extra_forbidden":
+        return f"{where} = {fault['input']!r}: no such key"
+    if fault["type"] == "value_error":
+        return f"{where}: {problem}" if where else problem
+    allowed = _expectation(field)
+    value = f"{where} = {fault['input']!r}{f' {unit}' if unit else ''}"
+    return f"{value}: {problem[0].lower()}{problem[1:]}{f'; allowed: {allowed}' if allowed else ''}"
+
+
+def _field_at(model: Any, location: tuple[int | str, ...]) -> FieldInfo | None:
+    """The deepest declared field on the way to a fault."""
+    field: FieldInfo | None = None
+    for part in location:
+        if isinstance(part, int) or not (isinstance(model, type) and issubclass(model, BaseModel)):
+            continue
+        field = model.model_fields.get(str(part))
+        if field is None:
+            return None
+        candidates = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        model = next((c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)), None)
+    return field
+
+
+def _unit(field: FieldInfo | None) -> str:
+    extra = field.json_schema_extra if field else None
+    unit = extra.get("unit", "") if isinstance(extra, dict) else ""
+    return "" if unit in ("-", "") else str(unit)
+
+
+def _expectation(field: FieldInfo | None) -> str:
+    """The allowed range of a field in words, from its own declaration."""
+    if field is None:
+        return ""
+    options = getattr(field.annotation, "__args__", ())
+    if options and all(isinstance(option, str) for option in options):
+        return " or ".join(options)
+    metadata = list(field.metadata)
+    for argument in options:  # a tuple of bounded numbers carries its bounds inside
+        metadata += [
+            m for info in getattr(argument, "__metadata__", ()) for m in getattr(info, "metadata", [])
+        ]
+    words: dict[str, None] = {}
+    for mark in metadata:
+        for kind, name, sign in (
+            (annotated_types.Gt, "gt", ">"),
+            (annotated_types.Ge, "ge", ">="),
+            (annotated_types.Lt, "lt", "<"),
+            (annotated_types.Le, "le", "<="),
+        ):
+            if isinstance(mark, kind):
+                words[f"{sign} {getattr(mark, name):g}"] = None
+    if not words and field.annotation in (float, Vector):
+        return "a finite number" if field.annotation is float else "three finite numbers"
+    return " and ".join(words)
+
+
+def hover_rotor_speed(vehicle: Vehicle) -> float:
+    """Rotor speed of hover for a vehicle with equal rotors, rad/s (eq. 24, corrected)."""
+    total = sum(rotor.thrust_coefficient for rotor in vehicle.rotors)
+    return math.sqrt(vehicle.hover_thrust / total)
