@@ -1,5 +1,6 @@
 """MAVLink framing, byte for byte against pymavlink, and behind any junk."""
 
+import itertools
 import random
 import struct
 from typing import Any
@@ -33,7 +34,7 @@ def random_message(kind: Any, generator: random.Random) -> Any:
             elif fieldtype in ("float", "double"):
                 entries.append(struct.unpack("<f", struct.pack("<f", generator.uniform(-1e3, 1e3)))[0])
             else:
-                bits = int(fieldtype.strip("uint_t"))
+                bits = int(fieldtype.removeprefix("u").removeprefix("int").removesuffix("_t"))
                 unsigned = fieldtype.startswith("u")
                 lowest = 0 if unsigned else -(1 << bits - 1)
                 entries.append(generator.randrange(lowest, lowest + (1 << bits)))
@@ -190,7 +191,7 @@ def test_a_stream_may_be_cut_anywhere(pieces: list[tuple[bytes, bytes]], cuts: l
     data += bytes(framing.LARGEST_FRAME)
     places = sorted({min(cut, len(data)) for cut in cuts} | {0, len(data)})
     stream = StreamSplitter()
-    found = [f for a, b in zip(places, places[1:], strict=False) for f in stream.receive(data[a:b])]
+    found = [f for a, b in itertools.pairwise(places) for f in stream.receive(data[a:b])]
     assert raw(found) == [frame for _, frame in pieces]
     assert stream.junk == len(data) - sum(len(frame) for _, frame in pieces)
 
