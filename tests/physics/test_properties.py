@@ -126,7 +126,7 @@ def integration_error(case: Case, states: Array) -> float:
     return DURATION * rate * (rate * STEP) ** 4 / 120 + 1e-13 * STEPS
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(cases())
 def test_power_goes_where_it_should(case: Case) -> None:
     """Rotors and external forces bring energy in; the damper, and nothing else, takes it out."""
@@ -152,7 +152,7 @@ def test_energy_balance_of_a_flight(case: Case) -> None:
     assert abs(error) < (10 * integration_error(case, states) + quadrature) * scale
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(cases())
 def test_only_external_forces_change_linear_momentum(case: Case) -> None:
     v = case.vehicle
@@ -207,7 +207,7 @@ def test_quaternion_stays_of_unit_length(case: Case) -> None:
     assert abs(rate[ATTITUDE] @ case.state[ATTITUDE]) < 1e-14
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(cases(model="tension-only", slack=True))
 def test_a_tension_only_cable_never_pushes_and_is_idle_when_slack(case: Case) -> None:
     v, (length, rate, along) = case.vehicle, cable(case.state)
