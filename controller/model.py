@@ -14,7 +14,7 @@ from sitl_bridge.vehicle import Vehicle
 
 
 class LinearModel(NamedTuple):
-    """x' = A x + B u, in deviations from hover; A is (18, 18), B is (18, 4)."""
+    """x' = A x + B u, in deviations from hover; A is (n, n), B is (n, 4), n = 18 unless states are appended."""
 
     A: Array
     B: Array
@@ -50,6 +50,21 @@ def linear_model(vehicle: Vehicle, length: float | None = None, thrust: float | 
     b[8, 0] = 1.0 / vehicle_mass
     b[12:15, 1:4] = np.diag(1.0 / np.array(vehicle.airframe.inertia))
     return LinearModel(a, b)
+
+
+def actuated_model(vehicle: Vehicle) -> LinearModel:
+    """The model at hover from the commanded wrench on: with the lag of the rotors, if they have one."""
+    time_constant = rotor_time_constant(vehicle)
+    model = linear_model(vehicle)
+    return with_rotor_lag(model, time_constant) if time_constant > 0.0 else model
+
+
+def rotor_time_constant(vehicle: Vehicle) -> float:
+    """Time constant of the wrench that the rotors give, s; 0 without lag, the mean where rotors differ.
+
+    Near hover thrust is linear in rotor speed, so the wrench lags its command as the speeds lag theirs.
+    """
+    return sum(rotor.time_constant for rotor in vehicle.rotors) / len(vehicle.rotors)
 
 
 def with_rotor_lag(model: LinearModel, time_constant: float) -> LinearModel:

@@ -50,6 +50,7 @@ class Rotor(Section):
     thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
     torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
     max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
+    time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
 
 
 class Cable(Section):
