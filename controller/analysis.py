@@ -11,7 +11,11 @@ from scipy import linalg
 
 from controller.law import STATE, Design
 from controller.model import LinearModel
-from controller.state import LOAD_POSITION, STATE_SIZE, WRENCH_SIZE, Array
+from controller.state import LOAD_POSITION, STATE_SIZE, Array
+
+
+STRIDE = 2e-3
+"""Steps, s, in which `delay_margin` looks for the loss of stability."""
 
 
 def held_input(model: LinearModel, duration: float) -> tuple[Array, Array]:
@@ -105,14 +109,13 @@ def delay_margin(
         return spectral_radius(closed_loop_matrix(model, design, delay, inputs)) < 1.0
 
     # Stability can come back with more delay, so the first loss is looked for in steps.
-    low, stride = 0.0, longest / 50.0
     if not stable(0.0):
         return 0.0
-    while stable(low + stride):
-        low += stride
-        if low >= longest:
+    low, high = 0.0, min(STRIDE, longest)
+    while stable(high):
+        if high == longest:
             return longest
-    high = low + stride
+        low, high = high, min(high + STRIDE, longest)
     while high - low > resolution:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stable(middle) else (low, middle)

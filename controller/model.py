@@ -14,7 +14,7 @@ from sitl_bridge.vehicle import Vehicle
 
 
 class LinearModel(NamedTuple):
-    """x' = A x + B u, in deviations from hover; A is (n, n), B is (n, 4), n = 18 unless states are appended."""
+    """x' = A x + B u, in deviations from hover; A (n, n), B (n, 4), n = 18 unless states are appended."""
 
     A: Array
     B: Array
