@@ -13,7 +13,6 @@ from controller.law import STATE, Design
 from controller.model import LinearModel
 from controller.state import LOAD_POSITION, STATE_SIZE, Array
 
-
 STRIDE = 2e-3
 """Steps, s, in which `delay_margin` looks for the loss of stability."""
 
