@@ -6,6 +6,7 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+from coordinates import paper_state
 
 from controller.allocation import MOST_ROTORS, allocation
 from controller.law import WORK, Design, engaged_memory
@@ -13,8 +14,6 @@ from controller.reference import Path
 from controller.state import LOAD_POSITION, STATE_SIZE, Array
 from controller.step import control_step
 from sitl.metrics import flight_metrics, reference_positions
-from sitl_bridge.frames import euler_from_quaternion
-from sitl_bridge.plant import state as plant
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
@@ -28,34 +27,20 @@ class Flight(NamedTuple):
     metrics: dict[str, float | bool | None]  # see sitl.metrics
 
 
-def eq31(state: Array) -> Array:
-    """State (18,) in the order of eq. 31 of the plant's state (19,)."""
-    return np.array(
-        [
-            *state[plant.VEHICLE_POSITION],
-            *state[plant.LOAD_POSITION],
-            *state[plant.VEHICLE_VELOCITY],
-            *state[plant.LOAD_VELOCITY],
-            *state[plant.BODY_RATES],
-            *euler_from_quaternion(state[plant.ATTITUDE]),
-        ]
-    )
-
-
 def fly(
     vehicle: Vehicle, design: Design, path: Path, duration: float, rate_hz: float, delay_ticks: int = 0
 ) -> Flight:
     """Fly a path from the vehicle's initial state; the plant applies commands `delay_ticks` later."""
     world = World(vehicle, rate_hz, seed=0)
     estimate, controls = np.zeros(STATE_SIZE), np.zeros(MOST_ROTORS)
-    estimate[:] = eq31(world.state)
+    estimate[:] = paper_state(world.state).real
     memory = engaged_memory(estimate[LOAD_POSITION])
     work = np.zeros(1, dtype=WORK)
     step = control_step.bind(design, allocation(vehicle), path, memory, work, estimate, controls)
     under_way = deque([tuple(world.trim_controls)] * delay_ticks)
     rows = []
     for _ in range(round(duration * rate_hz) + 1):
-        estimate[:] = eq31(world.state)
+        estimate[:] = paper_state(world.state).real
         limited = step()
         rows.append((estimate.copy(), controls.copy(), bool(limited), memory["integral"][0].copy()))
         under_way.append(tuple(controls.tolist()))
