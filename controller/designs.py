@@ -11,7 +11,16 @@ from controller.flatness import body
 from controller.law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
 from controller.lqr import Weights, sampled_gain, sampled_model
 from controller.model import actuated_model, rotor_time_constant, with_integrator
-from controller.state import STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE
+from controller.state import (
+    BODY_RATES,
+    EULER_ANGLES,
+    LOAD_POSITION,
+    LOAD_VELOCITY,
+    STATE_SIZE,
+    VEHICLE_POSITION,
+    VEHICLE_VELOCITY,
+    WRENCH_SIZE,
+)
 from sitl_bridge.vehicle import Vehicle
 
 DESIGNS = ("default", "paper", "paper-lqr")
@@ -34,18 +43,21 @@ def default_weights(vehicle: Vehicle) -> Weights:
     """Weights by largest acceptable deviation (Bryson's rule), the inputs scaled to the vehicle.
 
     Moments are weighed as angular accelerations and thrust as an acceleration of the whole, so that the
-    bandwidth, and with it the delay margin, is the same for every size of vehicle.
+    bandwidth, and with it the delay margin, is much the same for every size of vehicle.
     """
+    nowhere = 1e3  # m: the vehicle's own position matters only through the load's
     position, velocity, integral = 0.5, 0.5, 0.6  # m, m/s, m s
     rate, tilt, yaw = 2.0, 0.5, 0.5  # rad/s, rad, rad
     acceleration, angular, turning = 2.0, 15.0, 4.0  # m/s², rad/s², rad/s²
-    scales = np.array(
-        [1e3] * 3 + [position] * 3 + [velocity] * 6 + [rate, rate, rate] + [tilt, tilt, yaw] + [integral] * 3
-    )
-    inertia = np.array(vehicle.airframe.inertia)
+    deviations = np.zeros(STATE_SIZE + 3)
+    deviations[VEHICLE_POSITION], deviations[LOAD_POSITION] = nowhere, position
+    deviations[VEHICLE_VELOCITY] = deviations[LOAD_VELOCITY] = velocity
+    deviations[BODY_RATES], deviations[EULER_ANGLES] = rate, (tilt, tilt, yaw)
+    deviations[STATE_SIZE:] = integral
     mass = vehicle.airframe.mass + vehicle.load.mass
-    inputs = np.array([mass * acceleration, *(inertia * [angular, angular, turning])])
-    return Weights(np.diag(scales**-2.0), np.diag(inputs**-2.0))
+    inertia = np.array(vehicle.airframe.inertia)
+    efforts = np.array([mass * acceleration, *(inertia * (angular, angular, turning))])
+    return Weights(np.diag(deviations**-2.0), np.diag(efforts**-2.0))
 
 
 def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
