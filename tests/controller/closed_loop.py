@@ -6,7 +6,6 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
-from coordinates import paper_state
 
 from controller.allocation import MOST_ROTORS, allocation
 from controller.law import WORK, Design, engaged_memory
@@ -16,6 +15,7 @@ from controller.step import control_step
 from sitl.metrics import flight_metrics, reference_positions
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
+from tests.controller.coordinates import paper_state
 
 
 class Flight(NamedTuple):

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from fleet import FLEET, attributes
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -16,6 +15,7 @@ from controller.state import Array
 from sitl_bridge.plant import dynamics
 from sitl_bridge.plant.parameters import parameters
 from sitl_bridge.vehicle import Vehicle
+from tests.controller.fleet import FLEET, attributes
 
 
 class Result(NamedTuple):

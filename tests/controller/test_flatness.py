@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from coordinates import paper_state, plant_state
-from fleet import FLEET, attributes
 
 from controller.allocation import allocation
 from controller.flatness import STENCIL, body, flat_motion
@@ -22,6 +20,8 @@ from controller.state import (
 from sitl_bridge.plant import dynamics
 from sitl_bridge.plant.parameters import parameters
 from sitl_bridge.vehicle import Vehicle
+from tests.controller.coordinates import paper_state, plant_state
+from tests.controller.fleet import FLEET, attributes
 
 ORIGIN = (0.0, 0.0, 0.0)
 PATHS = {

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from closed_loop import Flight, fly
-from fleet import FLEET, attributes, delayed
 
 from controller.designs import DESIGNS, design
 from controller.law import WORK, Design, engaged_memory, remember, step
 from controller.reference import Path, circle, setpoint
 from controller.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array
 from sitl_bridge.vehicle import Vehicle, load_vehicle
+from tests.controller.closed_loop import Flight, fly
+from tests.controller.fleet import FLEET, attributes, delayed
 
 ORIGIN = (0.0, 0.0, 0.0)
 TARGET = (3.0, 5.0, 2.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fleet import FLEET
 from scipy import linalg
 
 from controller.designs import default_weights, paper_lqr_weights, paper_weights
@@ -19,6 +18,7 @@ from controller.lqr import (
 from controller.model import LinearModel, linear_model, with_integrator, with_rotor_lag
 from controller.state import Array
 from sitl_bridge.vehicle import Vehicle
+from tests.controller.fleet import FLEET
 
 PAPER = FLEET["paper"]
 OSCILLATOR = LinearModel(

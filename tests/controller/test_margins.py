@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fleet import FLEET, attributes, delayed
 from scipy import linalg
 
 from controller.analysis import closed_loop_matrix, delay_margin, spectral_radius
@@ -14,6 +13,7 @@ from controller.model import LinearModel, actuated_model
 from controller.reference import setpoint
 from controller.state import LOAD_POSITION, STATE_SIZE, Array
 from sitl_bridge.vehicle import Vehicle
+from tests.controller.fleet import FLEET, attributes, delayed
 
 ORIGIN = (0.0, 0.0, 0.0)
 EVERY_INPUT = (0, 1, 2, 3)

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from coordinates import paper_state, plant_state
-from fleet import FLEET, attributes
 
 from controller.allocation import allocation
 from controller.model import actuated_model, linear_model, rotor_time_constant, with_rotor_lag
@@ -17,6 +15,8 @@ from controller.state import STATE_SIZE
 from sitl_bridge.plant import dynamics
 from sitl_bridge.plant.parameters import parameters
 from sitl_bridge.vehicle import Vehicle, load_vehicle
+from tests.controller.coordinates import paper_state, plant_state
+from tests.controller.fleet import FLEET, attributes
 
 Vector = Any  # complex arrays: that is how they are differentiated
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fleet import attributes
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +19,7 @@ from controller.reference import (
     setpoint,
 )
 from controller.state import Array
+from tests.controller.fleet import attributes
 
 coordinate = st.floats(-20.0, 20.0)
 points = st.tuples(coordinate, coordinate, coordinate)
