@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.state import STATE_SIZE, WRENCH_SIZE, Array
+from controller.state import LOAD_POSITION, STATE_SIZE, WRENCH_SIZE, Array
 from sitl_bridge.vehicle import Vehicle
 
 
@@ -87,5 +87,5 @@ def with_integrator(model: LinearModel) -> LinearModel:
     size = model.A.shape[0]
     a = np.zeros((size + 3, size + 3))
     a[:size, :size] = model.A
-    a[size:, 3:6] = np.eye(3)
+    a[size:, LOAD_POSITION] = np.eye(3)
     return LinearModel(a, np.vstack([model.B, np.zeros((3, WRENCH_SIZE))]))
