@@ -84,7 +84,7 @@ def test_slack_cable_does_no_work() -> None:
 
 @pytest.mark.parametrize("damping", [0.0, 4.0])
 def test_snatches_converge_with_the_fourth_power_of_the_step(damping: float) -> None:
-    """Error of a flight with a dozen changes between slack and taut, against one with a sixteenth of the step."""
+    """Error of a flight with many changes between slack and taut, against one of finer steps."""
 
     def end(step: float) -> Array:
         plant = tumbling(400.0, damping, 2.0, 0.7, 0.7, -2.0)
@@ -151,7 +151,7 @@ def test_cable_breaks_once_and_for_all() -> None:
 
 
 def test_sudden_load_on_a_slack_cable_doubles_the_static_stretch() -> None:
-    """A load let go at the rest length under a vehicle held still stretches an undamped cable by 2 m g / k."""
+    """A load let go at the rest length stretches an undamped cable by 2 m g / k."""
     plant = Flight(
         plain_vehicle(
             airframe={"mass": 700.0},
