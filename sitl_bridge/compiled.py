@@ -63,7 +63,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def entry_point(
     *arguments: Buffer | Scalar, returns: Scalar = int
 ) -> Callable[[Callable[..., Any]], EntryPoint]:
-    """Mark a function that Python calls: `Buffer` for each array first, then `int` or `float` for each scalar."""
+    """Mark a function that Python calls: first a `Buffer` for each array, then a type for each scalar."""
     return lambda function: EntryPoint(function, arguments, returns)
 
 
