@@ -15,22 +15,13 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import annotated_types
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-Vector = tuple[float, float, float]
-Model = TypeVar("Model", bound="Section")
+from sitl_bridge.schema import Section, Vector, quantity
+from sitl_bridge.sensors import Sensors
 
-
-def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> Any:
-    """Declare a field with its unit and allowed range; both appear in messages about a faulty file."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **bounds)
-
-
-class Section(BaseModel):
-    """A table of the description: unknown keys, other types and values that are not finite are faults."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+Model = TypeVar("Model", bound=Section)
 
 
 class Drag(Section):
@@ -182,6 +173,7 @@ class Vehicle(Section):
     ground: Ground | None = None
     air: Air = Air()
     battery: Battery | None = None
+    sensors: Sensors = Sensors()
     loop: Loop = Loop()
     home: Home = Home()
 
@@ -292,7 +284,19 @@ def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
     source, content = read_toml(name_or_file, resources.files(__package__) / "vehicles", "vehicle")
     for override in overrides:
         apply_override(content, override)
+    if isinstance(sensors := content.get("sensors"), dict) and "preset" in sensors:
+        _, preset = read_toml(str(sensors["preset"]), resources.files(__package__) / "presets", "preset")
+        content["sensors"] = _merged(preset, sensors)
     return validated(Vehicle, content, source)
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Nested tables with some values replaced."""
+    out = dict(base)
+    for key, value in changes.items():
+        old = out.get(key)
+        out[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return out
 
 
 def apply_override(content: dict[str, Any], override: str) -> None:

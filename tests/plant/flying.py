@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from sitl_bridge.plant.state import (
     initial_inner_state,
     initial_state,
 )
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle, load_vehicle, validated
 
 Array = NDArray[np.float64]
 
@@ -117,9 +117,4 @@ def plain_vehicle(**changes: Any) -> Vehicle:
     }
     for table, entries in changes.items():
         content[table] = {**content.get(table, {}), **entries} if isinstance(entries, dict) else entries
-    return Vehicle.model_validate(content)
-
-
-def vector(values: Sequence[float]) -> Array:
-    """As an array."""
-    return np.asarray(values, dtype=float)
+    return validated(Vehicle, content, "test")

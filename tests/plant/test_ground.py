@@ -87,7 +87,7 @@ impacts = st.tuples(
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from(["iris", "heavy"]), impacts)
 def test_impacts_never_gain_energy(name: str, case: tuple[float, ...]) -> None:
-    """Dropped on any leg at any speed: energy without that in the ground's springs never exceeds the start's."""
+    """Dropped on any leg at any speed: energy outside the ground never exceeds the start's."""
     height, sideways, roll, pitch, spin = case
     plant = flight(
         name,
