@@ -441,29 +441,17 @@ def hover_rotor_speed(vehicle: Vehicle) -> float:
 
 
 def hover_rotor_speeds(vehicle: Vehicle) -> tuple[float, ...]:
-    """Rotor speeds of hover for any layout, rad/s: of all that carry the weight without a moment, least
-    effort.
-
-    Raises DescriptionError when no such thrusts exist, or only negative ones.
-    """
-    allocation = np.array(
+    """Rotor speeds that carry vehicle and load without any moment, for any layout, rad/s."""
+    effect = np.array(
         [
             (
-                1.0,
-                rotor.position[1],
-                -rotor.position[0],
-                (-1.0 if rotor.direction == "ccw" else 1.0)
-                * rotor.torque_coefficient
-                / rotor.thrust_coefficient,
+                rotor.thrust_coefficient,
+                rotor.position[1] * rotor.thrust_coefficient,
+                -rotor.position[0] * rotor.thrust_coefficient,
+                (-1.0 if rotor.direction == "ccw" else 1.0) * rotor.torque_coefficient,
             )
             for rotor in vehicle.rotors
         ]
     ).T
-    wanted = np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0])
-    thrusts = np.linalg.lstsq(allocation, wanted, rcond=None)[0]
-    if not np.allclose(allocation @ thrusts, wanted, atol=1e-6 * vehicle.hover_thrust) or thrusts.min() < 0.0:
-        raise DescriptionError(vehicle.name, ["rotors: this layout cannot hover without turning over"])
-    return tuple(
-        math.sqrt(thrust / rotor.thrust_coefficient)
-        for thrust, rotor in zip(thrusts, vehicle.rotors, strict=True)
-    )
+    squared, *_ = np.linalg.lstsq(effect, np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]), rcond=None)
+    return tuple(np.sqrt(np.maximum(squared, 0.0)).tolist())

@@ -154,9 +154,9 @@ class Wind:
             self._shared = math.exp(-vehicle.hover_length / dryden(self.air.turbulence).length[2])
 
     @property
-    def still(self) -> bool:
-        """Whether there is nothing to fill in, so that a table of zeros serves."""
-        return not (any(self.air.wind) or self._points or self.gusts)
+    def constant(self) -> bool:
+        """Whether it never changes."""
+        return not (self._points or self.gusts)
 
     def fill(self, rows: Array) -> None:
         """Write the next rows (n, 6): at the vehicle, at the load, m/s, world ENU."""

@@ -27,7 +27,6 @@ from sitl_bridge.plant.state import (
     INNER_SIZE,
     LOAD_GROUND_FORCE,
     MOST_ROTORS,
-    REACTIONS_SIZE,
     STATE_SIZE,
     TENSION,
     VEHICLE_GROUND_FORCE,
@@ -310,7 +309,7 @@ def feel(p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array,
         _, _, reactions[LOAD_GROUND_FORCE] = ground_on_load(p, x, inner)
 
 
-FORCE_ROWS = 1024
+TABLE_ROWS = 1024
 """Rows of the tables of held forces and winds that `advance` reads."""
 
 
@@ -319,10 +318,10 @@ FORCE_ROWS = 1024
     Buffer(np.float64, (STATE_SIZE,)),
     Buffer(np.float64, (INNER_SIZE,)),
     Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(np.float64, (FORCE_ROWS, 6)),
-    Buffer(np.float64, (FORCE_ROWS, 6)),
-    Buffer(np.float64, (REACTIONS_SIZE,)),
+    Buffer(np.float64, (TABLE_ROWS, 6)),
+    Buffer(np.float64, (TABLE_ROWS, 6)),
     Buffer(np.float64, (WORK_ROWS, STATE_SIZE)),
+    int,
     int,
     int,
     int,
@@ -336,9 +335,9 @@ def advance(
     command: Array,
     forces: Array,
     winds: Array,
-    reactions: Array,
     work: Array,
-    first_step: int,
+    first_force: int,
+    first_wind: int,
     force_hold: int,
     wind_hold: int,
     steps: int,
@@ -346,18 +345,17 @@ def advance(
 ) -> int:
     """Advance state and inner state by `steps` steps of `step` seconds with the commands held, in place.
 
-    command: rotor speeds, rad/s; forces: N, world, on vehicle and load, row k acts from step k·force_hold
-    on; winds: m/s, world, at vehicle and load, row k from step k·wind_hold on; reactions: written, as at
-    the end. first_step: number of the first step, counted from row 0 of both tables. Returns the next
-    step's number.
+    command: rotor speeds, rad/s; forces: N, world, on vehicle and load, row k acts from step k·force_hold on;
+    winds: m/s, world, at vehicle and load, row k from step k·wind_hold on; work: scratch; first_force,
+    first_wind: number of the first step, counted from row 0 of each table.
     """
     p = record[0]
     rotor_decay(p, 0.5 * step, work[_DECAY])
-    last = first_step + steps - 1
-    for index in range(first_step, last + 1):
-        whole_step(p, x, inner, command, forces[index // force_hold], winds[index // wind_hold], step, work)
-    feel(p, x, inner, forces[last // force_hold], winds[last // wind_hold], work, reactions)
-    return first_step + steps
+    for index in range(steps):
+        force = forces[(first_force + index) // force_hold]
+        wind = winds[(first_wind + index) // wind_hold]
+        whole_step(p, x, inner, command, force, wind, step, work)
+    return steps
 
 
 @kernel

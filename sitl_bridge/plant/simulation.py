@@ -16,7 +16,6 @@ from sitl_bridge.ids import COMPONENT_TRUTH, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer, decode
 from sitl_bridge.mavlink.hil import ODOMETRY
 from sitl_bridge.plant.messages import TickWriter
-from sitl_bridge.plant.sensing import GPS_RATE_HZ, gps_fix
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
@@ -62,7 +61,6 @@ class Simulation:
         self._writer = TickWriter(instance, self._origin, self.world.state, self.world.measurement)
         self._replies = Packer(vehicle_system(instance), COMPONENT_TRUTH)
         self._under_way: deque[Sequence[float]] = deque()
-        self._gps_ticks = max(1, round(rate_hz / GPS_RATE_HZ))
         self._datagram: bytes | None = None
 
     @property
@@ -83,9 +81,7 @@ class Simulation:
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for."""
         if self._datagram is None:
-            self.world.measure(not self.started, self._vehicle.home.altitude)
-            since = self.tick - self._first_flown
-            fix = gps_fix(self.world.state) if since % self._gps_ticks == 0 else None
+            fix = self.world.measure(self.tick - self._first_flown, not self.started)
             self._datagram = self._writer.datagram(self.time_usec, fix, self._truth and self._heard)
         return self._datagram
 

@@ -153,7 +153,7 @@ def test_compiled_and_plain_python_agree() -> None:
     force = np.array([1.0, -2.0, 0.5, 0.3, 0.2, -0.1])
     compiled = fly(record, initial_state(vehicle), speeds, 0.2, every=200, force=force)[-1]
     plain = initial_state(vehicle)
-    dynamics.advance.python(*arrays([fields(record)], plain, speeds, force[None]), 0, 200, 200, 200, 1e-3)
+    dynamics.advance.python(*arrays([fields(record)], plain, speeds, force[None]), 0, 0, 200, 200, 200, 1e-3)
     np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-14)
 
 
@@ -161,14 +161,14 @@ def test_held_forces_are_read_row_by_row() -> None:
     """Row k acts from step k·hold_steps on, wherever a call starts."""
     vehicle = load_vehicle("paper")
     generator = np.random.default_rng(3)
-    forces = generator.normal(size=(dynamics.FORCE_ROWS, 6))
+    forces = generator.normal(size=(dynamics.TABLE_ROWS, 6))
     record, speeds = parameters(vehicle), padded([hover_rotor_speed(vehicle)] * 4)
     one, two = initial_state(vehicle), initial_state(vehicle)
     after = 0
     for steps in (4, 3, 10, 1, 22):
-        after = dynamics.advance(*arrays(record, one, speeds, forces), after, 10, 10, steps, 1e-3)
+        after += dynamics.advance(*arrays(record, one, speeds, forces), after, after, 10, 10, steps, 1e-3)
     assert after == 40
     for row in range(4):
-        held = np.tile(forces[row], (dynamics.FORCE_ROWS, 1))
-        dynamics.advance(*arrays(record, two, speeds, held), 0, 10, 10, 10, 1e-3)
+        held = np.tile(forces[row], (dynamics.TABLE_ROWS, 1))
+        dynamics.advance(*arrays(record, two, speeds, held), 0, 0, 10, 10, 10, 1e-3)
     np.testing.assert_array_equal(one, two)

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.dynamics import FORCE_ROWS, WORK_ROWS, advance
+from sitl_bridge.plant.dynamics import TABLE_ROWS, WORK_ROWS, advance
 from sitl_bridge.plant.parameters import parameters
+from sitl_bridge.plant.sensing import measure
+from sitl_bridge.plant.sensors.instruments import MEASUREMENT
 from sitl_bridge.plant.state import (
     INNER_SIZE,
     LOAD_VELOCITY,
@@ -36,8 +38,8 @@ class Flight:
         self.x = initial_state(vehicle)
         self.inner = initial_inner_state(vehicle)
         self.command = np.zeros(MOST_ROTORS)
-        self.forces = np.zeros((FORCE_ROWS, 6))
-        self.winds = np.zeros((FORCE_ROWS, 6))
+        self.forces = np.zeros((TABLE_ROWS, 6))
+        self.winds = np.zeros((TABLE_ROWS, 6))
         self.reactions = np.zeros(REACTIONS_SIZE)
         assert self.inner.shape == (INNER_SIZE,)
         self._advance = advance.bind(
@@ -47,13 +49,24 @@ class Flight:
             self.command,
             self.forces,
             self.winds,
-            self.reactions,
             np.zeros((WORK_ROWS, STATE_SIZE)),
+        )
+        self._measure = measure.bind(
+            self.record,
+            self.x,
+            self.inner,
+            self.forces[0],
+            self.winds[0],
+            np.zeros((WORK_ROWS, STATE_SIZE)),
+            np.zeros(3),
+            self.reactions,
+            np.zeros(1, dtype=MEASUREMENT),
         )
 
     def run(self, duration: float, step: float = 1e-3) -> None:
-        """Fly on with everything held."""
-        self._advance(0, EVER, EVER, round(duration / step), step)
+        """Fly on with everything held, then fill `reactions`."""
+        self._advance(0, 0, EVER, EVER, round(duration / step), step)
+        self._measure(0, 0.0)
 
     def path(
         self,

@@ -25,9 +25,3 @@ def air_temperature(altitude: Any) -> Any:
 def air_pressure(altitude: Any) -> Any:
     """Pa at an altitude in m above mean sea level."""
     return SEA_LEVEL_PRESSURE * (air_temperature(altitude) / SEA_LEVEL_TEMPERATURE) ** PRESSURE_EXPONENT
-
-
-def pressure_altitude(pressure: float) -> float:
-    """Altitude in m above mean sea level at which the standard atmosphere has this pressure (Pa)."""
-    ratio = (pressure / SEA_LEVEL_PRESSURE) ** (1.0 / PRESSURE_EXPONENT)
-    return (1.0 - ratio) * SEA_LEVEL_TEMPERATURE / LAPSE_RATE

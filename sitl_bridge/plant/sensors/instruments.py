@@ -1,4 +1,4 @@
-"""The sensors of HIL_SENSOR: what they measure of the truth, with error, quantised, saturated, at their rates.
+"""The sensors of HIL_SENSOR: truth with error, quantised, saturated, at their rates.
 
 All errors of a block of ticks are drawn at once; what is left for each tick is compiled: add, round, clip.
 """
@@ -26,9 +26,10 @@ MEASUREMENT = np.dtype(
         ("differential_pressure", "f8"),  # Pa
         ("pressure_altitude", "f8"),  # m
         ("temperature", "f8"),  # deg C
+        ("updated", "i8"),  # bit i: channel i, in this order, is new (as HIL_SENSOR.fields_updated has it)
     ]
 )
-CHANNELS = MEASUREMENT.itemsize // 8
+CHANNELS = 13
 
 
 class Place(NamedTuple):
@@ -65,11 +66,11 @@ ROWS = 512
 def read(
     truth: Any, errors: Array, garbage: Array, figures: Array, timing: Any, reading: Any, tick: int
 ) -> int:
-    """Readings of one tick from the truth; returns the bits of what is new, as HIL_SENSOR.fields_updated has them.
+    """Readings of one tick from the truth, as a real sensor gives them.
 
-    errors, garbage: of each tick of a block, SI; figures: rows of resolution (0: none), least and most, and what
-    a wrong sensor is off by; timing: rows of ticks from reading to reading, and of what the sensor does; reading:
-    written where it is new.
+    errors, garbage: of each tick of a block, SI; figures: rows of resolution (0: none), least and most, and
+    what a wrong sensor is off by; timing: rows of ticks from reading to reading, and of what the sensor
+    does; reading: written where it is new.
     """
     true, out = truth[0], reading[0]
     row = tick % ROWS
@@ -118,6 +119,7 @@ def read(
             out.pressure_altitude = value
         else:
             out.temperature = value
+    out.updated = bits
     return bits
 
 
@@ -145,7 +147,8 @@ class Instruments:
     def __init__(
         self, sensors: Sensors, tick_period: float, seed: int, truth: Any, pascals_per_metre: float
     ) -> None:
-        """truth: record of MEASUREMENT that holds the truth at each `read`; pascals_per_metre: < 0, at home."""
+        """truth: record of MEASUREMENT that holds the truth at each `read`; pascals_per_metre: < 0, at
+        home."""
         self.reading = np.zeros(1, dtype=MEASUREMENT)
         self._errors = np.zeros((ROWS, CHANNELS))
         self._garbage = np.zeros((ROWS, CHANNELS))
@@ -174,18 +177,18 @@ class Instruments:
             )
         self._fill_garbage(stream(seed, "garbage"))
         self._timing[1] = WORKS
+        self._draw()
 
     def set(self, name: str, doing: int) -> None:
         """Let a sensor work (WORKS) or fail (OFF, STUCK, GARBAGE, WRONG)."""
         first, axes = PLACES[name]
         self._timing[1, first : first + axes] = doing
 
-    def read(self, tick: int) -> int:
-        """Fill `reading` from the truth at `tick`, to be called for 0, 1, 2 …; returns the bits of what is new."""
-        if tick % ROWS == 0:
+    def read(self, tick: int) -> None:
+        """Fill `reading` from the truth at `tick`: once for 0 or 1, then for each that follows."""
+        if tick % ROWS == 0 and tick > 0:
             self._draw()
-        bits: int = self._read(tick)
-        return bits
+        self._read(tick)
 
     def _set_figures(self, name: str, instrument: Instrument) -> None:
         first, axes = PLACES[name]
@@ -197,7 +200,8 @@ class Instruments:
             self._figures[1, places], self._figures[2, places] = -instrument.range, instrument.range
         self._figures[3, places] = WRONG_BY[name]
         if name == "barometer":
-            # Its figures are in metres of height; what it measures is pressure. No error of differential pressure.
+            # Its figures are in metres of height; what it measures is pressure. No error of differential
+            # pressure.
             self._figures[0, 9] = instrument.resolution * -self._slope
             self._figures[1:3, 9] = 0.0, math.inf
             self._figures[:, 10] = 0.0, -math.inf, math.inf, 0.0

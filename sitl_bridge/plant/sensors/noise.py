@@ -24,7 +24,8 @@ class White:
 
 
 class RandomWalk:
-    """A bias that starts anywhere (standard deviation `start`) and walks (SI s^-½), sampled every `period`."""
+    """A bias that starts anywhere (standard deviation `start`) and walks (SI s^-½), sampled every
+    `period`."""
 
     def __init__(
         self, start: float, walk: float, period: float, axes: int, generator: np.random.Generator
@@ -63,7 +64,8 @@ class GaussMarkov:
 
 
 class Dropouts:
-    """Losses that begin at random (Poisson) and last at random (exponential), stepped every `period` seconds."""
+    """Losses that begin at random (Poisson) and last at random (exponential), stepped every `period`
+    seconds."""
 
     def __init__(
         self, per_hour: float, duration: float, period: float, generator: np.random.Generator
