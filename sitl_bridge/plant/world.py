@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.plant.battery import BatteryReading, drained, electric_power, reading
 from sitl_bridge.plant.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.dynamics import WORK_ROWS, advance
 from sitl_bridge.plant.parameters import parameters, step_count
@@ -17,7 +18,9 @@ from sitl_bridge.plant.sensors.atmosphere import air_pressure
 from sitl_bridge.plant.sensors.gps import GpsFix, GpsReceiver
 from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
 from sitl_bridge.plant.sensors.magnetic import field_at
+from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.state import (
+    CABLE_HOLDS,
     MOST_ROTORS,
     REACTIONS_SIZE,
     STATE_SIZE,
@@ -44,6 +47,7 @@ class World:
         self.rotor_speed = np.zeros(MOST_ROTORS)
         self.trim_controls = trim_controls(vehicle)
         self._seed = seed
+        self._speed_share = [1.0] * MOST_ROTORS
         self._record = parameters(vehicle)
         self._largest_speed = self._record["max_speed"][0]
         self._truth = np.zeros(1, dtype=MEASUREMENT)
@@ -51,8 +55,8 @@ class World:
         slope = air_pressure(altitude + 0.5) - air_pressure(altitude - 0.5)
         self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
         self.measurement = self.instruments.reading
-        self.gps = GpsReceiver(vehicle.sensors.gps, 1.0 / rate_hz, seed)
-        self._rate_hz = rate_hz
+        self._period = 1.0 / rate_hz
+        self._begin_sensing()
         self._force = HeldForce(vehicle.disturbance, self.step, seed)
         self._wind = HeldWind(vehicle, self.step, seed)
         work = np.zeros((WORK_ROWS, STATE_SIZE))
@@ -85,14 +89,24 @@ class World:
         self._force.reset(self._seed)
         self._wind.reset(self._seed)
         self.instruments.reset(self._seed)
-        self.gps = GpsReceiver(self.vehicle.sensors.gps, 1.0 / self._rate_hz, self._seed)
+        self._begin_sensing()
+        self._speed_share = [1.0] * MOST_ROTORS
+        self.set_load_mass(None)
         self.command(self.trim_controls if self.vehicle.initial.start == "hover" else STOPPED)
+
+    def _begin_sensing(self) -> None:
+        sensors, battery = self.vehicle.sensors, self.vehicle.battery
+        self.gps = GpsReceiver(sensors.gps, self._period, self._seed)
+        self.tracker = None
+        if sensors.tracker is not None:
+            self.tracker = LoadTracker(sensors.tracker, self._period, self._seed)
+        self._charge = battery.charge if battery is not None else 1.0
 
     def command(self, controls: Sequence[float]) -> None:
         """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""
         for i, (control, largest) in enumerate(zip(controls, self._largest_speed.tolist(), strict=True)):
             within = min(max(control, 0.0), 1.0) if math.isfinite(control) else 0.0
-            self.rotor_speed[i] = within * largest
+            self.rotor_speed[i] = within * largest * self._speed_share[i]
 
     def advance(self, steps: int) -> None:
         """Advance by so many integration steps with the rotors held."""
@@ -105,6 +119,37 @@ class World:
             force.advance(covered)
             wind.advance(covered)
             steps -= covered
+
+    def battery(self, duration: float) -> BatteryReading | None:
+        """Draw on the battery for `duration` seconds at the rotors' present speeds; None: there is none."""
+        battery = self.vehicle.battery
+        if battery is None:
+            return None
+        speeds = self.inner[: len(self.vehicle.rotors)].tolist()
+        now = reading(battery, self._charge, electric_power(self.vehicle, battery, speeds))
+        self._charge = drained(battery, self._charge, now.current, duration)
+        return now
+
+    def set_sensor(self, name: str, doing: int) -> None:
+        """Let a sensor work or fail, see `sensors.instruments`."""
+        if name == "gps":
+            self.gps.doing = doing
+        elif name != "tracker":
+            self.instruments.set(name, doing)
+        elif self.tracker is not None:
+            self.tracker.doing = doing
+
+    def set_rotor(self, index: int, thrust: float) -> None:
+        """Leave a rotor (from 0) a share of its thrust, at the same command."""
+        self._speed_share[index] = math.sqrt(thrust)
+
+    def release_cable(self) -> None:
+        """Join vehicle and load no more."""
+        self.inner[CABLE_HOLDS] = 0.0
+
+    def set_load_mass(self, mass: float | None) -> None:
+        """Change the load's mass, kg; None: as described."""
+        self._record["load_mass"] = self.vehicle.load.mass if mass is None else mass
 
     def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array, Array]:
         """Parameter record, state, inner state, commands and force as they change, for a log to read."""

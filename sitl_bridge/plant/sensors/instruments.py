@@ -47,8 +47,8 @@ PLACES = {
     "thermometer": Place(12, 1),
 }
 
-# What a sensor does; kept for each channel.
-WORKS, OFF, STUCK, GARBAGE, WRONG = range(5)
+# What a sensor does; kept for each channel. Only GPS can be lost: it says that it has no fix.
+WORKS, OFF, STUCK, GARBAGE, WRONG, LOST = range(6)
 
 ROWS = 512
 """Ticks whose errors are drawn at once."""

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl_bridge.frames import Quaternion, Triple, rotate_inverse
+from sitl_bridge.plant.sensors.instruments import WORKS
 from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
 from sitl_bridge.plant.streams import stream
 from sitl_bridge.sensors import Tracker
@@ -47,15 +48,17 @@ class LoadTracker:
         self.tracker = tracker
         self.every = max(1, round(1.0 / (tracker.rate * tick_period)))
         self.late = round(tracker.delay / tick_period)
+        self.doing = WORKS
+        """What the camera does, as of the instruments: anything but WORKS, and it sees nothing."""
         self._delay = self.late * tick_period
         self._under_way: deque[tuple[int, Sighting]] = deque()
         self._white = stream(seed, "tracker.white")
 
-    def sample(self, tick: int, x: Array, blind: bool = False) -> Sighting | None:
-        """The sighting that arrives at `tick` (counted from 0, each once); blind: a fault covers the lens."""
+    def sample(self, tick: int, x: Array) -> Sighting | None:
+        """The sighting that arrives at `tick` (counted from 0 or 1, each once)."""
         if tick % self.every == 0:
             seen = sighting(self.tracker, x, self._white.standard_normal(3), self._delay)
-            if seen is not None and not blind:
+            if seen is not None and self.doing == WORKS:
                 self._under_way.append((tick + self.late, seen))
         if self._under_way and self._under_way[0][0] <= tick:
             return self._under_way.popleft()[1]
