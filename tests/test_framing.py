@@ -216,7 +216,7 @@ def test_an_endless_stream_of_start_bytes_is_not_kept() -> None:
     assert raw(stream.receive(good + bytes(framing.LARGEST_FRAME))) == [good]
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(
     st.binary(max_size=2000) | st.lists(st.sampled_from([0xFD, 0xFE, 0, 1, 255]), max_size=2000).map(bytes)
 )

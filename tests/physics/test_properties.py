@@ -100,24 +100,33 @@ def flight(case: Case) -> Array:
     return fly(case.record, case.state, case.rotor_speed, DURATION, force=case.force)
 
 
-def integration_error(case: Case, states: Array) -> float:
-    """Bound of RK4's relative error over a flight, from the fastest rate in it.
-
-    The method's error over a time t is about t·λ·(λh)⁴ / 120 for a motion that changes at the rate λ.
-    """
+def fastest_rate(case: Case, states: Array) -> float:
+    """The fastest rate of a flight, 1/s: of spring, damper, attitude and swing."""
     v, (length, _, _) = case.vehicle, cable(states)
     reduced = v.airframe.mass * v.load.mass / (v.airframe.mass + v.load.mass)
     across = states[:, LOAD_VELOCITY] - states[:, VEHICLE_VELOCITY]
-    fastest = max(
-        math.sqrt(v.cable.stiffness / reduced),
-        v.cable.damping / reduced,
-        3 * np.linalg.norm(states[:, BODY_RATES], axis=1).max(),
-        3 * (np.linalg.norm(across, axis=1) / length).max(),
+    return float(
+        max(
+            math.sqrt(v.cable.stiffness / reduced),
+            v.cable.damping / reduced,
+            3 * np.linalg.norm(states[:, BODY_RATES], axis=1).max(),
+            3 * (np.linalg.norm(across, axis=1) / length).max(),
+        )
     )
-    return float(DURATION * fastest * (fastest * STEP) ** 4 / 120 + 1e-13 * STEPS)
 
 
-@settings(max_examples=100)
+def integration_error(case: Case, states: Array) -> float:
+    """RK4's relative error over a flight: t·λ·(λh)⁴ / 120 where things change at the rate λ; and rounding.
+
+    Only flights that the step resolves (λh < 0.1), and that keep away from the singular length 0, count.
+    """
+    rate = fastest_rate(case, states)
+    assume(rate * STEP < 0.1)
+    assume(cable(states)[0].min() > 0.3)
+    return DURATION * rate * (rate * STEP) ** 4 / 120 + 1e-13 * STEPS
+
+
+@settings(max_examples=60)
 @given(cases())
 def test_power_goes_where_it_should(case: Case) -> None:
     """Rotors and external forces bring energy in; the damper, and nothing else, takes it out."""
@@ -132,17 +141,18 @@ def test_power_goes_where_it_should(case: Case) -> None:
 @given(cases())
 def test_energy_balance_of_a_flight(case: Case) -> None:
     states = flight(case)
-    length, rate, _ = cable(states)
-    assume(length.min() > 0.3)  # equations are singular at length 0
+    _, rate, _ = cable(states)
     energy = mechanical_energy(case, states)
     net = supplied_power(case, states) - case.vehicle.cable.damping * rate**2
     # Energy that goes through the flight, as a scale.
     scale = np.ptp(energy) + np.abs(energy).max() + simpson(np.abs(net), dx=STEP)
     error = energy[-1] - energy[0] - simpson(net, dx=STEP)
-    assert abs(error) < 10 * integration_error(case, states) * scale
+    # Powers are quadratic, so they change at twice the rate, and Simpson's rule errs by (2λh)⁴ / 180.
+    quadrature = (2 * fastest_rate(case, states) * STEP) ** 4 / 180
+    assert abs(error) < (10 * integration_error(case, states) + quadrature) * scale
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(cases())
 def test_only_external_forces_change_linear_momentum(case: Case) -> None:
     v = case.vehicle
@@ -176,7 +186,6 @@ def test_angular_momentum_of_a_fall(case: Case) -> None:
     """Without rotors the vehicle's spin is kept, in the world, and the pair's about its common centre."""
     v, states = case.vehicle, flight(case)
     length = cable(states)[0]
-    assume(length.min() > 0.3)
     bound = integration_error(case, states)
     spin = np.einsum("nij,nj->ni", rotation(states), np.array(v.airframe.inertia) * states[:, BODY_RATES])
     assert np.abs(spin - spin[0]).max() < 10 * bound * (1e-3 + np.linalg.norm(spin[0]))
@@ -198,7 +207,7 @@ def test_quaternion_stays_of_unit_length(case: Case) -> None:
     assert abs(rate[ATTITUDE] @ case.state[ATTITUDE]) < 1e-14
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(cases(model="tension-only", slack=True))
 def test_a_tension_only_cable_never_pushes_and_is_idle_when_slack(case: Case) -> None:
     v, (length, rate, along) = case.vehicle, cable(case.state)

@@ -46,13 +46,13 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
         "gravity": draw(st.floats(1, 15)),
         "airframe": {
             "mass": draw(st.floats(0.5, 20)),
-            "inertia": draw(st.tuples(*[st.floats(0.01, 1)] * 3)),
+            "inertia": draw(st.tuples(*[st.floats(0.1, 1)] * 3)),
         },
         "rotors": tuple(
             {
                 "position": draw(vector(1)),
                 "direction": draw(st.sampled_from(["cw", "ccw"])),
-                "thrust_coefficient": draw(st.floats(1e-3, 0.1)),
+                "thrust_coefficient": draw(st.floats(1e-3, 0.02)),
                 "torque_coefficient": draw(st.floats(0, 0.05)),
                 "max_speed": 1e4,
             }
