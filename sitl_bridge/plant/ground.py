@@ -72,36 +72,40 @@ def ground_on_vehicle(p: Any, x: Array, inner: Array, out: Array) -> None:
     r00, r01, r02 = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qw * qz), 2 * (qx * qz + qw * qy)
     r10, r11, r12 = 2 * (qx * qy + qw * qz), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qw * qx)
     r20, r21, r22 = 2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy)
-    for i in range(6):
-        out[i] = 0.0
+    # Turning, in the world.
+    wx = r00 * x[10] + r01 * x[11] + r02 * x[12]
+    wy = r10 * x[10] + r11 * x[11] + r12 * x[12]
+    wz = r20 * x[10] + r21 * x[11] + r22 * x[12]
+    total_x, total_y, total_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(p.leg_count):
         bx, by, bz = p.leg_x[i], p.leg_y[i], p.leg_z[i]
-        depth = p.ground_height - x[2] - (r20 * bx + r21 * by + r22 * bz)
-        if depth <= 0.0:
-            continue
-        # Velocity of the leg in the body, from turning: omega x b.
-        ux, uy, uz = x[11] * bz - x[12] * by, x[12] * bx - x[10] * bz, x[10] * by - x[11] * bx
+        ax, ay, az = (
+            r00 * bx + r01 * by + r02 * bz,
+            r10 * bx + r11 * by + r12 * bz,
+            r20 * bx + r21 * by + r22 * bz,
+        )
         fx, fy, fz = contact_force(
             p.leg_stiffness,
             p.contact_chi,
             p.leg_damping,
             p.leg_friction,
-            depth,
-            x[0] + (r00 * bx + r01 * by + r02 * bz) - inner[FIRST_ANCHOR + 2 * i],
-            x[1] + (r10 * bx + r11 * by + r12 * bz) - inner[FIRST_ANCHOR + 2 * i + 1],
-            x[3] + (r00 * ux + r01 * uy + r02 * uz),
-            x[4] + (r10 * ux + r11 * uy + r12 * uz),
-            x[5] + (r20 * ux + r21 * uy + r22 * uz),
+            p.ground_height - x[2] - az,
+            x[0] + ax - inner[FIRST_ANCHOR + 2 * i],
+            x[1] + ay - inner[FIRST_ANCHOR + 2 * i + 1],
+            x[3] + wy * az - wz * ay,
+            x[4] + wz * ax - wx * az,
+            x[5] + wx * ay - wy * ax,
         )
-        out[0] += fx
-        out[1] += fy
-        out[2] += fz
-        gx = r00 * fx + r10 * fy + r20 * fz
-        gy = r01 * fx + r11 * fy + r21 * fz
-        gz = r02 * fx + r12 * fy + r22 * fz
-        out[3] += by * gz - bz * gy
-        out[4] += bz * gx - bx * gz
-        out[5] += bx * gy - by * gx
+        total_x += fx
+        total_y += fy
+        total_z += fz
+        moment_x += ay * fz - az * fy
+        moment_y += az * fx - ax * fz
+        moment_z += ax * fy - ay * fx
+    out[0], out[1], out[2] = total_x, total_y, total_z
+    out[3] = r00 * moment_x + r10 * moment_y + r20 * moment_z
+    out[4] = r01 * moment_x + r11 * moment_y + r21 * moment_z
+    out[5] = r02 * moment_x + r12 * moment_y + r22 * moment_z
 
 
 @kernel
