@@ -304,8 +304,9 @@ def feel(p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array,
     reactions[VEHICLE_GROUND_FORCE] = 0.0
     reactions[LOAD_GROUND_FORCE] = 0.0
     if p.has_ground:
-        ground_on_vehicle(p, x, inner, work[_GROUND])
-        reactions[VEHICLE_GROUND_FORCE] = work[_GROUND, 2]
+        if x[2] - p.ground_height < p.leg_reach:
+            ground_on_vehicle(p, x, inner, work[_GROUND])
+            reactions[VEHICLE_GROUND_FORCE] = work[_GROUND, 2]
         _, _, reactions[LOAD_GROUND_FORCE] = ground_on_load(p, x, inner)
 
 

@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple, Protocol
 
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.schema import Section, quantity
-from sitl_bridge.vehicle import Gust
+from sitl_bridge.vehicle import Gust, Vehicle
 
 FAILURES = {"off": OFF, "stuck": STUCK, "garbage": GARBAGE, "wrong": WRONG, "lost": LOST}
 
@@ -150,6 +150,14 @@ def timeline(faults: Faults) -> list[Due]:
     for load in faults.load:
         found += _from_to(load, SetLoadMass(load.mass), SetLoadMass(None))
     return sorted(found, key=lambda due: due.time)
+
+
+def with_gusts(vehicle: Vehicle, faults: Faults) -> Vehicle:
+    """The vehicle with the scenario's gusts in its air."""
+    if not faults.gust:
+        return vehicle
+    air = vehicle.air.model_copy(update={"gusts": (*vehicle.air.gusts, *faults.gust)})
+    return vehicle.model_copy(update={"air": air})
 
 
 def _from_to(fault: Timed, begin: Action, end: Action) -> list[Due]:

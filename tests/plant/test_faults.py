@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
+from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.plant.faults import (
     Due,
     Faults,
@@ -22,6 +23,7 @@ from sitl_bridge.plant.faults import (
 from sitl_bridge.plant.link_faults import FaultyPath
 from sitl_bridge.plant.sensors.gps import NO_FIX
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
+from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.state import CABLE_HOLDS
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import DescriptionError, load_vehicle, validated
@@ -174,3 +176,40 @@ def test_link_faults() -> None:
     assert [index for _, index in stalled] == list(range(1000))
     assert all(arrival == 1.5 for arrival, index in stalled if 250 <= index < 375)
     assert sent([{"failure": "stall", "at": 1.0}])[-1][1] == 249
+
+
+def test_scenario_faults_happen_at_their_time() -> None:
+    """On the tick that they are due, whichever clock steps the world."""
+    table = {"cable": [{"at": 0.1}], "gust": [{"start": 0.0, "duration": 1.0, "peak": [5.0, 0.0, 0.0]}]}
+    simulation = Simulation(
+        load_vehicle("iris", ["initial.start=hover"]), 250.0, 1, faults=validated(Faults, table, "test")
+    )
+    simulation.begin()
+    holds = []
+    for _ in range(50):
+        holds.append(simulation.world.inner[CABLE_HOLDS])
+        simulation.step(simulation.world.trim_controls)
+    assert holds == [1.0] * 25 + [0.0] * 25
+    assert simulation.world.state[3] > 0.01  # blown to the east
+
+
+@pytest.mark.parametrize(
+    ("unit", "result", "stopped"),
+    [
+        (common.FAILURE_UNIT_SYSTEM_MOTOR, common.MAV_RESULT_ACCEPTED, 1),
+        (common.FAILURE_UNIT_SENSOR_VIO, common.MAV_RESULT_UNSUPPORTED, 0),
+    ],
+)
+def test_failures_are_injected_over_mavlink(unit: int, result: int, stopped: int) -> None:
+    simulation = Simulation(load_vehicle("iris", ["initial.start=hover"]), 250.0, 1)
+    simulation.begin()
+    command = common.MAVLink_command_long_message(
+        1, 191, common.MAV_CMD_INJECT_FAILURE, 0, unit, common.FAILURE_TYPE_OFF, 2, 0, 0, 0, 0
+    )
+    [frame] = split(Packer(1, 1).pack(command)).frames
+    reply = simulation.handle(frame)
+    assert reply is not None
+    [answer] = split(reply).frames
+    assert decode(answer).result == result
+    simulation.step(simulation.world.trim_controls)
+    assert np.count_nonzero(simulation.world.rotor_speed[:4] == 0.0) == stopped
