@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from flying import flight
 from scipy.signal import welch
 
 from sitl_bridge.plant.air import WIND_HOLD, Turbulent, Wind, dryden, gust_velocity
 from sitl_bridge.plant.streams import stream
 from sitl_bridge.vehicle import Gust, Turbulence, Vehicle, load_vehicle
+from tests.plant.flying import flight
 
 TURBULENCE = Turbulence(wind_at_6_m=15.4, height=10.0, airspeed=8.0)
 

@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from flying import Array, Flight, energy, flight, plain_vehicle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl_bridge.plant.parameters import LONGEST_STEP, fastest_rate, step_count
 from sitl_bridge.plant.state import CABLE_HOLDS, LOAD_POSITION, LOAD_VELOCITY, TENSION, VEHICLE_VELOCITY
 from sitl_bridge.vehicle import load_vehicle
+from tests.plant.flying import Array, Flight, energy, flight, plain_vehicle
 
 
 def tumbling(

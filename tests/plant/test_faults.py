@@ -106,7 +106,7 @@ def test_unsupported_commands(command: tuple[float, float, float]) -> None:
 
 
 def hovering() -> World:
-    return World(load_vehicle("iris", ["initial.start=hover"]), 250.0, 1)
+    return World(load_vehicle("iris", ["initial.start=hover", "sensors.preset=ideal"]), 250.0, 1)
 
 
 def test_faults_reach_the_world() -> None:

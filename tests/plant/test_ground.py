@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from flying import energy, flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +19,7 @@ from sitl_bridge.plant.state import (
     VEHICLE_VELOCITY,
 )
 from sitl_bridge.vehicle import DescriptionError, load_vehicle
+from tests.plant.flying import energy, flight
 
 
 @pytest.mark.parametrize("name", ["iris", "heavy"])

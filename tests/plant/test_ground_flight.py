@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from flying import Array, Flight, flight
 
 from sitl_bridge.plant.parameters import step_count
 from sitl_bridge.plant.state import (
@@ -14,6 +13,7 @@ from sitl_bridge.plant.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
+from tests.plant.flying import Array, Flight, flight
 
 PERIOD = 0.004
 

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from flying import Flight, flight
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -12,6 +11,7 @@ from scipy.integrate import solve_ivp
 from sitl_bridge.plant.battery import drained, electric_power, reading
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Battery, hover_rotor_speeds, load_vehicle
+from tests.plant.flying import Flight, flight
 
 BATTERY = Battery(cells=4, capacity=5.0, resistance=0.05)
 
