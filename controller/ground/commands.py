@@ -290,7 +290,6 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _message(),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _message(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION),
-    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: _message(mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION),
     mavlink.MAV_CMD_PREFLIGHT_STORAGE: _storage,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,

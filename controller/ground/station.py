@@ -42,7 +42,11 @@ _MISSION_COMPONENTS = (0, VEHICLE_COMPONENT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 _BROADCAST = 0
 _LOAD_MESSAGES = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0}
 """Hz, at most, at which the load's own messages are passed on"""
-_ON_CHANGE = (mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, CurrentMode.id)
+_ON_CHANGE = (
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    CurrentMode.id,
+)
 """Sent at once when the mode changes, or armed changes"""
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
@@ -427,7 +431,7 @@ class Station:
             return
         request = bytes(message.payload)
         sequence = int.from_bytes(request[:2], "little") + 1 & 0xFFFF
-        # Sequence, session, opcode NAK, size 1, requested opcode, burst, padding, offset; error UnknownCommand.
+        # Sequence, session, NAK, size 1, requested opcode, burst, padding, offset; UnknownCommand.
         answer = sequence.to_bytes(2, "little") + bytes((request[2], 129, 1, request[3], 0, 0, 0, 0, 0, 0, 7))
         ftp = mavlink.MAVLink_file_transfer_protocol_message
         self._send(peer, ftp(0, frame.system, frame.component, answer.ljust(251, b"\0")), now)

@@ -375,8 +375,6 @@ def build(message_id: int, machine: Machine) -> Any:
         return heartbeat(machine)
     if message_id == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
         return autopilot_version(machine)
-    if message_id == mavlink.MAVLINK_MSG_ID_PROTOCOL_VERSION:
-        return mavlink.MAVLink_protocol_version_message(200, 100, 200, [0] * 8, [0] * 8)
     if message_id == CurrentMode.id:
         return _current_mode(machine)
     if message_id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
