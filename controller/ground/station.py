@@ -127,15 +127,16 @@ class Station:
         except (mavlink.MAVError, struct.error, ValueError):
             self.dropped += 1
             return
-        if message.id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:
+        number = frame.message_id  # not message.id: some messages have a field of that name
+        if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:
             peer.last_station_heartbeat = now
-        handler = _HANDLERS.get(message.id)
+        handler = _HANDLERS.get(number)
         if handler is not None:
             handler(self, message, frame, peer, now)
-        elif message.id in mission_protocol.MESSAGES:
+        elif number in mission_protocol.MESSAGES:
             self._mission(message, frame, peer, now)
-        elif message.id in _NOT_FLOWN:
-            self._say_seldom(peer, _NOT_FLOWN[message.id], now)
+        elif number in _NOT_FLOWN:
+            self._say_seldom(peer, _NOT_FLOWN[number], now)
 
     def relay(self, frame: Frame, now: float) -> None:
         """The load's own message, from the plant's link: it is passed on as from the load."""

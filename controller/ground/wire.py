@@ -77,7 +77,7 @@ def packed(message: Any) -> Packed | None:
     if isinstance(message, Packed):
         return message
     try:
-        return Packed(payload_of(message), message.id, message.crc_extra)
+        return Packed(payload_of(message), message.get_msgId(), message.crc_extra)  # `id` may be a field
     except (struct.error, OverflowError, ValueError):
         return None
 
