@@ -51,7 +51,9 @@ def serve(seconds: float, local: tuple[int, int], remote: tuple[int, int], speed
             deadline = now + 0.02
             while (now := time.monotonic()) < deadline:
                 links.exchange(station, now)
-                select.select(links.sockets, [], [], max(0.0, min(deadline, station.next_deadline(now)) - now))
+                select.select(
+                    links.sockets, [], [], max(0.0, min(deadline, station.next_deadline(now)) - now)
+                )
     finally:
         links.close()
 

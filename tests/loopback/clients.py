@@ -107,7 +107,9 @@ class MavProxy:
             if found >= 0:
                 return found + len(text)
             time.sleep(0.05)
-        raise AssertionError(f"MAVProxy did not print {text!r} within {timeout:g} s:\n{self.output()[-3000:]}")
+        raise AssertionError(
+            f"MAVProxy did not print {text!r} within {timeout:g} s:\n{self.output()[-3000:]}"
+        )
 
     def stop(self) -> None:
         """End it."""
