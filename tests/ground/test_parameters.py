@@ -15,7 +15,20 @@ from controller.ground.parameter_table import BY_NAME, TABLE, markdown
 from tests.ground.rig import Channel, Client, Rig
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
-READ_BY_QGROUNDCONTROL = ["SYS_AUTOSTART", "COM_RC_IN_MODE", "RC_MAP_ROLL", "RC_MAP_PITCH", "RC_MAP_YAW", "RC_MAP_THROTTLE", "CAL_GYRO0_ID", "CAL_ACC0_ID", "CAL_MAG0_ID", "BAT1_V_CHARGED", "BAT1_V_EMPTY", "BAT1_N_CELLS"]
+READ_BY_QGROUNDCONTROL = [
+    "SYS_AUTOSTART",
+    "COM_RC_IN_MODE",
+    "RC_MAP_ROLL",
+    "RC_MAP_PITCH",
+    "RC_MAP_YAW",
+    "RC_MAP_THROTTLE",
+    "CAL_GYRO0_ID",
+    "CAL_ACC0_ID",
+    "CAL_MAG0_ID",
+    "BAT1_V_CHARGED",
+    "BAT1_V_EMPTY",
+    "BAT1_N_CELLS",
+]
 
 
 def set_message(name: str, value: float, kind: int) -> Any:
