@@ -91,7 +91,7 @@ def download(client: Client, timeout: float = 10.0) -> Items:
 
 
 def same(a: Items, b: Items) -> bool:
-    return repr(a) == repr(b)
+    return [[repr(float(x)) for x in item] for item in a] == [[repr(float(x)) for x in item] for item in b]
 
 
 def test_a_plan_comes_back_as_it_went_up() -> None:
