@@ -50,7 +50,7 @@ _ON_CHANGE = (
 """Sent at once when the mode changes, or armed changes"""
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
-    mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not supported; send position",
+    mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not supported",
     mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
 }
 

@@ -119,5 +119,5 @@ class VehicleView:
     @property
     def in_reach(self) -> bool:
         """Whether the state is made of finite numbers within 1000 km."""
-        numbers = (*self.position, *self.velocity, *self.attitude, *self.load_position, *self.load_velocity)
-        return all(abs(number) < 1e6 for number in numbers)
+        size = math.hypot(*self.position, *self.velocity, *self.load_position, *self.load_velocity)
+        return size < 1e6 and math.hypot(*self.attitude) < 2.0  # a NaN fails both

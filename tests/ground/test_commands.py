@@ -36,8 +36,14 @@ def test_arm_takes_one_or_nought_only(p1: float) -> None:
 
 @pytest.mark.parametrize(
     ("p1", "main", "sub"),
-    [(1, 99, 0), (99, 0, 0), (1, 4, 99), (1, 1, 0), (1, 3, 0), (1, 4, 8), (1, 10, 0), (1, 4.5, 0), (NAN, 4, 3), (1, NAN, NAN), (1, 1e9, 0)],
-)  # fmt: skip
+    [
+        *((1, main, 0) for main in (99, 1, 3, 10, 4.5, 1e9)),
+        *((1, 4, sub) for sub in (99, 8)),
+        (99, 0, 0),
+        (NAN, 4, 3),
+        (1, NAN, NAN),
+    ],
+)
 def test_modes_that_are_not_there_are_refused_with_a_reason(p1: float, main: float, sub: float) -> None:
     """PX4 accepts 99."""
     rig = Rig()
@@ -125,10 +131,18 @@ def test_acknowledgements_come_from_the_addressed_component() -> None:
     assert client.command(400, 1).get_srcSystem() == 1
 
 
-@pytest.mark.parametrize(("number", "params", "message"), [
-    (512, (148,), "AUTOPILOT_VERSION"), (520, (1,), "AUTOPILOT_VERSION"), (512, (242,), "HOME_POSITION"),
-    (512, (1,), "SYS_STATUS"), (512, (0,), "HEARTBEAT"), (512, (244, 30), "MESSAGE_INTERVAL"), (510, (30,), "MESSAGE_INTERVAL"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("number", "params", "message"),
+    [
+        (512, (148,), "AUTOPILOT_VERSION"),
+        (520, (1,), "AUTOPILOT_VERSION"),
+        (512, (242,), "HOME_POSITION"),
+        (512, (1,), "SYS_STATUS"),
+        (512, (0,), "HEARTBEAT"),
+        (512, (244, 30), "MESSAGE_INTERVAL"),
+        (510, (30,), "MESSAGE_INTERVAL"),
+    ],
+)
 def test_messages_on_request(number: int, params: tuple[float, ...], message: str) -> None:
     rig = Rig()
     client = rig.client()

@@ -15,15 +15,20 @@ from controller.ground.wire import frame
 from tests.ground.rig import NAN, Channel, Rig
 
 SPICE = [NAN, float("inf"), float("-inf"), -1.0, 0.0, 1.0, 2.0, 21196.0, 1e38, 0.5]
+WORDS = [
+    "PARAM",
+    "MISSION",
+    "COMMAND",
+    "SET_",
+    "PING",
+    "TIMESYNC",
+    "FILE_TRANSFER",
+    "DATA_STREAM",
+    "HEARTBEAT",
+]
 HANDLED = [
-    name
-    for name in dir(mavlink)
-    if name.startswith("MAVLINK_MSG_ID_")
-    and any(
-        word in name
-        for word in ("PARAM", "MISSION", "COMMAND", "SET_", "PING", "TIMESYNC", "FILE_TRANSFER", "DATA_STREAM", "HEARTBEAT")
-    )
-]  # fmt: skip
+    name for name in dir(mavlink) if name.startswith("MAVLINK_MSG_ID_") and any(w in name for w in WORDS)
+]
 IDS = sorted({getattr(mavlink, name) for name in HANDLED if getattr(mavlink, name) in mavlink.mavlink_map})
 
 

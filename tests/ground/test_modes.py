@@ -278,7 +278,7 @@ def test_speed() -> None:
 
 
 def test_the_target_is_the_same_object_while_nothing_changes() -> None:
-    rig, client = flying()
+    rig, _client = flying()
     rig.run(0.1)
     first = rig.target
     rig.run(3.0)
@@ -289,7 +289,7 @@ def test_the_target_is_the_same_object_while_nothing_changes() -> None:
 
 
 def test_offboard_needs_set_points_first() -> None:
-    rig, client = flying()
+    _rig, client = flying()
     assert client.command(176, 1, 6, 0).result == REJECTED
     assert "send them" in client.texts()[-1]
 
@@ -479,11 +479,11 @@ def test_link_to_the_plant_lost_and_back(action: int, expected: str) -> None:
 
 
 def test_position_lost_lands_and_a_tumble_terminates() -> None:
-    rig, client = flying()
+    rig, _ = flying()
     rig.view.health.position = False
     rig.run(0.1)
     assert mode(rig) == "LAND"
-    rig, client = flying()
+    rig, _client = flying()
     rig.view.attitude = quaternion_from_euler((1.5, 0.0, 0.0))
     rig.run(0.02)
     assert rig.target == Terminate()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from pymavlink.dialects.v10 import common as v1
 from pymavlink.dialects.v20 import common as mavlink
@@ -100,7 +102,7 @@ def test_sequence_numbers_count_for_each_peer_without_a_gap() -> None:
     rig.run(5.0)
     for each in (client, other):
         numbers = [raw[4] for raw in each.raw]
-        assert all((b - a) % 256 == 1 for a, b in zip(numbers, numbers[1:], strict=False))
+        assert all((b - a) % 256 == 1 for a, b in itertools.pairwise(numbers))
 
 
 def test_a_datagram_may_hold_several_frames_and_junk() -> None:
