@@ -30,6 +30,8 @@ from controller.ground.wire import AvailableModes, CurrentMode, Packed, packed
 from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame, decode, split
 
 STATION_LINK, ONBOARD_LINK = 0, 1
+GUIDANCE_PERIOD = 0.02
+"""s, at most, between two looks of the mode machine at the vehicle"""
 TEXT_LENGTH = 50
 """Characters of one STATUSTEXT; longer texts go in pieces"""
 TEXT_PAUSE = 2.0
@@ -94,6 +96,11 @@ class Station:
         self._load: dict[int, tuple[Packed, float]] = {}
         self._load_sent: dict[tuple[Address, int], float] = {}
         self._housekeeping = now
+        self._due = now
+        """When something is to be sent next"""
+        self._stirred = True
+        """Something has come in that the mode machine may have to react to"""
+        self._next_look = (-math.inf, -math.inf)
         self._announced = (self.machine.armed, self.machine.mode)
         if storage is not None:
             self._load_parameters(storage)
@@ -102,6 +109,8 @@ class Station:
 
     def receive(self, datagram: bytes, address: Address, now: float) -> None:
         """A datagram from a peer. Never raises, whatever is in it."""
+        self._stirred = True
+        self._due = now
         for frame in split(datagram[:0xFFFF]).frames:
             if self._takes(frame, now):
                 self._receive_frame(frame, address, now)
@@ -145,15 +154,27 @@ class Station:
             as_packed = packed(message)
             if as_packed is not None:
                 self._load[frame.message_id] = (as_packed, now)
+                self._due = now
 
     # The control loop
 
     def update(self, view: VehicleView, now: float) -> Target:
-        """What the law is to do now; the same object as before for as long as nothing changes."""
-        target = self.machine.update(view, now, self.peers.last_station)
+        """What the law is to do now; the same object as before for as long as nothing changes.
+
+        Made to be called at every tick: it looks at the state every GUIDANCE_PERIOD, of the plant's time or
+        of ours, and at once when something has come in.
+        """
+        machine = self.machine
+        machine.view = view
+        if not self._stirred and view.time < self._next_look[0] and now < self._next_look[1]:
+            return machine.target
+        self._stirred = False
+        self._next_look = (view.time + GUIDANCE_PERIOD, now + GUIDANCE_PERIOD)
+        target = machine.update(view, now, self.peers.last_station)
         state = (self.machine.armed, self.machine.mode)
         if state != self._announced:
             self._announced = state
+            self._due = now
             for peer in self.peers:
                 peer.streams.hasten(_ON_CHANGE, now)
         if self.machine.notices:
@@ -174,13 +195,16 @@ class Station:
 
     def announce(self, notice: Notice, now: float) -> None:
         """A STATUSTEXT to every peer."""
+        self._due = now
         for peer in self.peers:
             self._say(peer, notice, now)
 
     # Out
 
     def to_send(self, now: float) -> list[tuple[Address, bytes]]:
-        """Every frame that is due, as datagrams: (to whom, bytes)."""
+        """Every frame that is due, as datagrams: (to whom, bytes). Costs nothing when nothing is."""
+        if now < self._due:
+            return []
         if now >= self._housekeeping:
             self._housekeeping = now + _HOUSEKEEPING
             for address in self.peers.forget_silent(now):
@@ -200,16 +224,17 @@ class Station:
         for peer in table.values():
             out.extend((peer.address, raw) for raw in peer.queue)
             peer.queue.clear()
+        self._due = min(
+            self._housekeeping,
+            self.parameters.next_deadline(),
+            self.missions.next_deadline(),
+            *(peer.streams.next for peer in table.values()),
+        )
         return out
 
     def next_deadline(self, now: float) -> float:
         """When `to_send` has something again, if nothing comes in before; at the latest in a second."""
-        if any(peer.queue for peer in self.peers):
-            return now
-        streams = min((peer.streams.next for peer in self.peers), default=math.inf)
-        return min(
-            streams, self._housekeeping, self.parameters.next_deadline(), self.missions.next_deadline()
-        )
+        return max(now, self._due)
 
     def _send_streams(self, now: float) -> None:
         built: dict[int, Packed | None] = {}
@@ -280,6 +305,7 @@ class Station:
 
     def _broadcast(self, message: Any, now: float) -> None:
         as_packed = packed(message)
+        self._due = now
         for peer in self.peers:
             self._send(peer, as_packed, now)
 
