@@ -11,6 +11,8 @@ from controller.ground.verdict import OK, Verdict, deny
 FASTEST = 250.0
 """Hz, of any message"""
 _SHORTEST_INTERVAL = 1.0 / FASTEST
+SPREAD = 0.1
+"""s, over which a new peer's streams begin"""
 FASTEST_DATA_STREAM = 50.0
 """Hz, of a group asked for by REQUEST_DATA_STREAM"""
 
@@ -74,7 +76,9 @@ class Streams:
 
     def __init__(self, now: float) -> None:
         self._intervals = {message_id: 1.0 / rate for message_id, rate in DEFAULT_RATES.items()}
-        self._due = dict.fromkeys(self._intervals, now)
+        # HEARTBEAT first; the others spread out, so that no tick of the control loop has to build them all.
+        spread = SPREAD / len(self._intervals)
+        self._due = {message_id: now + index * spread for index, message_id in enumerate(self._intervals)}
         self.next = now
         """When something is due again; inf if nothing is."""
 

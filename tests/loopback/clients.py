@@ -81,12 +81,12 @@ class MavProxy:
         self._out = self.log.open("wb")
         self._process = subprocess.Popen(
             [str(program), f"--master={master}", "--nowait", f"--state-basedir={folder}", "--default-modules="
-             "mode,arm,param,wp,cmdlong,misc,link,signing,rc"],
+             "mode,arm,param,ftp,wp,cmdlong,misc,link,signing,rc"],
             stdin=subprocess.PIPE,
             stdout=self._out,
             stderr=subprocess.STDOUT,
             cwd=folder,
-            env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "TERM": "dumb"},
+            env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "TERM": "dumb", "PYTHONUNBUFFERED": "1"},
         )  # fmt: skip
 
     def say(self, command: str) -> None:
