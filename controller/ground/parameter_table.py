@@ -39,7 +39,6 @@ _WEIGHT = "Weight in the LQR's cost; the gains are designed again in flight. "
 TABLE: tuple[Parameter, ...] = (
     # Who the vehicle is. QGroundControl's pages read these.
     Parameter("SYS_AUTOSTART", 10016, 1, 99999, "", "Airframe that ground stations show (not 0: they would ask to set it up)"),
-    Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "Let MAV_CMD_INJECT_FAILURE inject faults", ((0, "no"), (1, "yes"))),
     Parameter("COM_RC_IN_MODE", 1, 1, 1, "", "Source of manual control; there is none but a joystick that is ignored", ((1, "joystick only"),)),
     Parameter("RC_MAP_ROLL", 0, 0, 18, "", "Remote-control channel; no effect, read by ground stations"),
     Parameter("RC_MAP_PITCH", 0, 0, 18, "", "Remote-control channel; no effect, read by ground stations"),

@@ -9,8 +9,8 @@ import socket
 from controller.ground.peers import Address
 from controller.ground.station import Station
 
-MOST_DATAGRAMS = 64
-"""Datagrams read at once from a link: a flood must not hold up the control loop"""
+MOST_DATAGRAMS = 8
+"""Datagrams read at once from a link: a flood waits in the socket, not in front of the control loop"""
 
 
 class BindError(ValueError):

@@ -171,7 +171,7 @@ def test_random_commands_with_likely_numbers() -> None:
 def test_a_flood_is_bounded() -> None:
     rig = Rig()
     client = rig.client()
-    for _ in range(20_000 // 20):
+    for _ in range(5_000 // 20):
         client.send(*[mavlink.MAVLink_command_long_message(1, 1, 512, 0, 148, *(0,) * 6)] * 20)
     assert all(len(peer.queue) <= 1000 for peer in rig.station.peers)
     alive(rig)

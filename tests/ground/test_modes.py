@@ -285,6 +285,27 @@ def test_the_target_is_the_same_object_while_nothing_changes() -> None:
     assert rig.target is first
 
 
+def test_at_a_fast_tick_the_machine_looks_seldom_and_commands_take_effect_at_once() -> None:
+    rig, client = flying()
+    machine = rig.station.machine
+    looks = 0
+    original = machine.update
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal looks
+        looks += 1
+        return original(*arguments)
+
+    machine.update = counted  # type: ignore[method-assign]
+    for _ in range(250):
+        rig.now += 0.001
+        rig.view.time += 0.001
+        rig.station.update(rig.view, rig.now)
+    assert looks == pytest.approx(12.5, abs=1)
+    client.send(mavlink.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, *(NAN,) * 5))
+    assert rig.station.update(rig.view, rig.now) == Idle(False)
+
+
 # Offboard
 
 
