@@ -125,18 +125,30 @@ class Machine:
         faults = self.arming_faults()
         if faults or self.view is None:
             return not_now("Arming refused: " + "; ".join(faults))
-        self.armed = True
-        self._armed_at = now
-        self._ready_since = self.view.time
-        self._landed = False
-        self.failsafes.reset()
-        self._set_home(self.view)
-        airborne = not self.view.vehicle_on_ground
-        self.stage = Stage.FLYING if airborne else Stage.GROUND
-        if airborne:
-            self._hold_here(self.view)
+        self._begin_flight(self.view, now)
         self._say(INFO, "Armed")
         return OK
+
+    def resume(self, view: VehicleView, now: float) -> None:
+        """Take over a vehicle that is in the air (the controller was started again in flight), and hold."""
+        self.view = view
+        self._begin_flight(view, now)
+        if self.profile.has_ground:
+            # Where it was armed is not known; the ground is where the world's origin is.
+            self.home = self._home_load = (view.position[0], view.position[1], 0.0)
+        self._say(WARNING, "Started in flight: holding")
+
+    def _begin_flight(self, view: VehicleView, now: float) -> None:
+        self.armed = True
+        self._armed_at = now
+        self._ready_since = view.time
+        self._landed = False
+        self.failsafes.reset()
+        self._set_home(view)
+        airborne = not view.vehicle_on_ground
+        self.stage = Stage.FLYING if airborne else Stage.GROUND
+        if airborne:
+            self._hold_here(view)
 
     def disarm(self, force: bool) -> Verdict:
         """Disarm: on the ground, or anywhere by force."""

@@ -393,6 +393,21 @@ def test_set_points_faster_than_the_envelope_are_limited() -> None:
     assert rig.target.velocity == pytest.approx((4.8, 3.6, 2.0))
 
 
+def test_a_controller_that_starts_in_flight_holds() -> None:
+    rig, _ = flying()
+    again = Rig(view=rig.view)
+    client = again.client()
+    again.station.machine.resume(again.view, again.now)
+    again.run(5.0)
+    assert again.station.armed
+    assert mode(again) == "HOLD"
+    assert again.view.position[2] == pytest.approx(2.5, abs=0.4)
+    assert "Started in flight" in client.texts()[0]
+    assert client.command(21).result == ACCEPTED
+    again.run_until(lambda: not again.station.armed)
+    assert again.view.vehicle_on_ground
+
+
 # Failsafes
 
 
