@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from sitl_bridge.ids import HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.process import Speaker, StopRequest
-from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, vehicle_names
+from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, preset_names, vehicle_names
 
 if TYPE_CHECKING:
     from sitl.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.plant.faults import Faults
 
 DEFAULT_RATE_HZ = 250.0
 DESIGNS = ("default", "paper", "paper-lqr")
@@ -153,6 +154,11 @@ def _vehicle(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="override one value of the vehicle description, as in cable.rest_length=10 (repeatable)",
     )
+    parser.add_argument(
+        "--sensors",
+        metavar="PRESET",
+        help=f"what its sensors are like: {', '.join(preset_names())}; as --set sensors.preset=PRESET",
+    )
 
 
 def _link(parser: argparse.ArgumentParser) -> None:
@@ -257,8 +263,9 @@ def _hil_address(arguments: argparse.Namespace, kind: Any) -> Address:
     return arguments.hil or default
 
 
-def _what_to_fly(arguments: argparse.Namespace, overrides: Sequence[str]) -> tuple[Vehicle, Scenario | None]:
+def _what_to_fly(arguments: argparse.Namespace) -> tuple[Vehicle, Scenario | None]:
     """Vehicle and scenario of `plant` and `controller`."""
+    overrides = _overrides(arguments)
     if arguments.scenario is None:
         return load_vehicle(arguments.vehicle or "paper", overrides), None
     from sitl.scenario import load_scenario, scenario_vehicle
@@ -267,10 +274,22 @@ def _what_to_fly(arguments: argparse.Namespace, overrides: Sequence[str]) -> tup
     return scenario_vehicle(scenario, arguments.vehicle, overrides), scenario
 
 
+def _overrides(arguments: argparse.Namespace) -> list[str]:
+    """--sensors and --set, in this order, so that single figures change the preset."""
+    preset = [] if arguments.sensors is None else [f"sensors.preset={arguments.sensors}"]
+    return [*preset, *arguments.set]
+
+
+def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
+    from sitl_bridge.plant.faults import Faults, checked
+
+    return Faults() if scenario is None else checked(scenario.faults, vehicle)
+
+
 def _plant(arguments: argparse.Namespace) -> int:
     if arguments.speed is not None and arguments.clock != "lockstep":
         raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
-    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    vehicle, scenario = _what_to_fly(arguments)
     from sitl_bridge.plant.run import PlantOptions, run
 
     speaker = Speaker("plant", events=arguments.until_eof)
@@ -288,6 +307,7 @@ def _plant(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         on_silence=arguments.on_silence,
         out=arguments.out,
+        faults=_faults_of(scenario, vehicle),
     )
     outcome = run(options, speaker, stop)
     if arguments.json and not arguments.until_eof:
@@ -296,7 +316,7 @@ def _plant(arguments: argparse.Namespace) -> int:
 
 
 def _controller(arguments: argparse.Namespace) -> int:
-    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
     from sitl.scenario import Hover
 
@@ -332,7 +352,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         scenario_name=arguments.scenario,
         scenario=load_scenario(arguments.scenario),
         vehicle=arguments.vehicle,
-        overrides=arguments.set,
+        overrides=_overrides(arguments),
         plant_overrides=arguments.plant_set,
         hil=_hil_address(arguments, "udpout"),
         clock=arguments.clock,

@@ -13,10 +13,12 @@ import numpy as np
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.plant.faults import Faults
+from sitl_bridge.plant.faulty_link import FaultyLink
 from sitl_bridge.plant.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.realtime import Realtime
-from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.state import LOAD_POSITION
 from sitl_bridge.plant.statelog import FILE_NAME, StateLog
 from sitl_bridge.process import Speaker, StopRequest
@@ -42,6 +44,7 @@ class PlantOptions:
     drop_percent: float = 0.0
     on_silence: OnSilence = "wait"
     out: Path | None = None
+    faults: Faults = NO_FAULTS
 
 
 class Progress:
@@ -88,6 +91,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         options.instance,
         options.duration_s,
         on_begin=progress.begin,
+        faults=options.faults,
     )
     log, tlog = None, None
     if options.out is not None:
@@ -97,6 +101,8 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
+    if options.faults.link:
+        link = FaultyLink(link, options.faults.link, options.seed, lambda: progress.began_at)
     notices = Notices(speaker.say)
     clock: Lockstep | Realtime
     if options.clock == "lockstep":
