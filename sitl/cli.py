@@ -9,9 +9,9 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sitl_bridge.ids import HIL_UDP_PORT, MOST_INSTANCES
+from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, preset_names, vehicle_names
 
@@ -54,14 +54,23 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
     return parse
 
 
-def link_address(text: str) -> Address:
-    """An argument type: the address of a link."""
+def link_address(text: str) -> str:
+    """An argument type: the address of a link, the port perhaps left out."""
     from sitl_bridge.mavlink.links import parse_address
 
     try:
-        return parse_address(text)
+        parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def host_and_port(text: str) -> tuple[str, int]:
+    """An argument type: HOST:PORT."""
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, as in 127.0.0.1:14550")
+    return host, int(port)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -101,6 +110,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     for add in (_scenario, _vehicle, _link, _clock, _loop, _run, _output, _supervised):
         add(plant)
+    plant.add_argument(
+        "--load-to",
+        metavar="HOST:PORT",
+        type=host_and_port,
+        help="show the load to a ground station directly, for an autopilot that does not (PX4)",
+    )
     plant.set_defaults(run=_plant)
 
     controller = commands.add_parser(
@@ -167,7 +182,8 @@ def _link(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         type=link_address,
         help="HIL link: udpout:HOST:PORT, udpin:…, tcpin:… or tcpout:…; for `fly` the plant's end of it "
-        f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first)",
+        f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first; "
+        f"an address may leave out its port, {HIL_TCP_PORT}+N for TCP, and host)",
     )
     parser.add_argument(
         "--instance",
@@ -256,11 +272,11 @@ def _supervised(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _hil_address(arguments: argparse.Namespace, kind: Any) -> Address:
-    from sitl_bridge.mavlink.links import Address
+def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
+    from sitl_bridge.mavlink.links import parse_address
 
-    default = Address(kind, "127.0.0.1", HIL_UDP_PORT + arguments.instance)
-    return arguments.hil or default
+    udp_port, tcp_port = HIL_UDP_PORT + arguments.instance, HIL_TCP_PORT + arguments.instance
+    return parse_address(arguments.hil or kind, udp_port, tcp_port)
 
 
 def _what_to_fly(arguments: argparse.Namespace) -> tuple[Vehicle, Scenario | None]:
@@ -308,6 +324,7 @@ def _plant(arguments: argparse.Namespace) -> int:
         on_silence=arguments.on_silence,
         out=arguments.out,
         faults=_faults_of(scenario, vehicle),
+        load_to=arguments.load_to,
     )
     outcome = run(options, speaker, stop)
     if arguments.json and not arguments.until_eof:

@@ -15,6 +15,7 @@ from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.mavlink.tlog import TlogWriter
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.plant.faulty_link import FaultyLink
+from sitl_bridge.plant.load_to import LoadTo
 from sitl_bridge.plant.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.realtime import Realtime
@@ -45,6 +46,8 @@ class PlantOptions:
     on_silence: OnSilence = "wait"
     out: Path | None = None
     faults: Faults = NO_FAULTS
+    load_to: tuple[str, int] | None = None
+    """Ground station that is shown the load directly."""
 
 
 class Progress:
@@ -115,10 +118,15 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         f"{options.vehicle.name}, {options.clock} at {options.rate_hz:g} Hz, "
         f"waiting for an autopilot on {options.hil} (system {options.instance + 1})"
     )
+    station: Station | None = None
     try:
-        _loop(clock, link, tlog, progress, stop)
+        if options.load_to is not None:
+            station = Station(options.load_to, LoadTo(options.instance, simulation.origin))
+        _loop(clock, link, tlog, progress, station, stop)
     finally:
         link.close()
+        if station is not None:
+            station.close()
         if tlog is not None:
             tlog.close()
         if log is not None:
@@ -130,8 +138,31 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
     return outcome
 
 
+class Station:
+    """A ground station that is shown the load."""
+
+    def __init__(self, address: tuple[str, int], load: LoadTo) -> None:
+        self._link = open_link(Address("udpout", *address), lambda text: None)
+        self._load = load
+
+    def show(self, now: float, simulation: Simulation) -> None:
+        """Send what is due."""
+        datagram = self._load.to_send(now, simulation.time_usec, simulation.world.state)
+        if datagram is not None:
+            self._link.send(datagram)
+
+    def close(self) -> None:
+        """Free the port."""
+        self._link.close()
+
+
 def _loop(
-    clock: Lockstep | Realtime, link: Link, tlog: TlogWriter | None, progress: Progress, stop: StopRequest
+    clock: Lockstep | Realtime,
+    link: Link,
+    tlog: TlogWriter | None,
+    progress: Progress,
+    station: Station | None,
+    stop: StopRequest,
 ) -> None:
     gc.collect()
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
@@ -150,6 +181,8 @@ def _loop(
             if tlog is not None:
                 tlog.write(received, epoch + now)
         progress.report(now, clock.simulation)
+        if station is not None:
+            station.show(now, clock.simulation)
 
 
 def _outcome(
