@@ -47,7 +47,7 @@ class Paced:
         """Whether it goes out at this tick; to be asked once a tick."""
         if self._interval is None or time_usec < self._due:
             return False
-        self._due = max(self._due + self._interval, time_usec - self._interval)
+        self._due = max(self._due + self._interval, time_usec)
         return True
 
 
