@@ -1,0 +1,101 @@
+"""`sitl paper`: runs every experiment of the paper and writes one page and the numbers behind it."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sitl.paper import hover, model, motions, page
+from sitl.paper.context import Context
+from sitl.paper.flights import FlightError, Pilot
+from sitl.paper.record import Ledger
+from sitl_bridge.process import StopRequest
+
+PAGE_NAME = "index.html"
+NUMBERS_NAME = "paper.json"
+
+SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
+    ("The model (section II)", model.section),
+    ("Hovering (section III)", hover.section),
+    ("The uncontrolled motions (figs. 2 to 5, 12 to 16)", motions.section),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run came out."""
+
+    outside: list[str]
+    """Keys of the checks that are out of tolerance."""
+    files: tuple[Path, Path]
+
+
+def run(out: Path, quick: bool, stop: StopRequest) -> Outcome:
+    """Run everything, write the page and the numbers into `out`.
+
+    Raises flights.FlightError when a flight does not come to its end.
+    """
+    begun = time.monotonic()
+
+    def say(text: str) -> None:
+        print(f"paper: {time.monotonic() - begun:5.1f} s  {text}", file=sys.stderr, flush=True)
+
+    out.mkdir(parents=True, exist_ok=True)
+    ledger = Ledger()
+    with tempfile.TemporaryDirectory(prefix="sitl-paper-") as folder:
+        context = Context(ledger, Pilot(Path(folder), stop), quick, say)
+        sections = [(title, content(context)) for title, content in SECTIONS]
+        ledger.put(
+            "run", {"quick": quick, "flights": context.pilot.flown, "duration_s": time.monotonic() - begun}
+        )
+    sections.insert(0, ("Verdicts", page.verdict_table(ledger)))
+    sections.append(("Every number that was checked", page.check_table(ledger)))
+    text = page.document(
+        "Load transportation with an elastic cable, reproduced and corrected", _lead(ledger), sections
+    )
+    files = out / PAGE_NAME, out / NUMBERS_NAME
+    files[0].write_text(text, encoding="utf-8")
+    files[1].write_text(json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    say(f"wrote {files[0]} and {files[1]}")
+    return Outcome(ledger.outside, files)
+
+
+def main(out: Path, quick: bool) -> int:
+    """Run for a person; returns the exit code."""
+    stop = StopRequest()
+    stop.install()
+    try:
+        outcome = run(out, quick, stop)
+    except FlightError as error:
+        print(f"paper: {error}", file=sys.stderr)
+        return 130 if stop else 1
+    for key in outcome.outside:
+        print(f"paper: out of tolerance: {key}", file=sys.stderr)
+    return 1 if outcome.outside else 0
+
+
+def _lead(ledger: Ledger) -> str:
+    counts: dict[str, int] = {}
+    for v in ledger.verdicts:
+        counts[v.verdict] = counts.get(v.verdict, 0) + 1
+    tally = ", ".join(f"{count} {page.verdict(words)}" for words, count in counts.items())
+    run = ledger.numbers["run"]
+    return page.text(
+        "A bachelor's assignment of July 2023, “Load transportation with an elastic cable: modeling and "
+        "control”, derives the equations of a quadrotor that carries a load on an elastic cable, and flies it with an "
+        "LQR. This page runs every experiment of that paper again and says of each claim whether it "
+        f"holds: {tally}. Of {len(ledger.checks)} checked numbers {len(ledger.checks) - len(ledger.outside)} are "
+        "within tolerance. "
+        f"Flights ({run['flights']}) are real ones: the simulated vehicle and its controller run as two "
+        "processes that meet only over MAVLink, 250 times a second of simulated time. Every number here was "
+        f"computed in this {'quick ' if run['quick'] else ''}run of {run['duration_s']:.0f} s and stands in "
+        "<code>paper.json</code> under the key given at the end."
+    ) + page.text(
+        "<b>Colours</b>, everywhere: vehicle blue, load orange, cable green, the load's reference black and dotted; "
+        "roll, pitch and yaw, and the moments about these axes, purple, brown and pink. SI units; x east, y north, z up."
+    )
