@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.paper import hover, model, motions, page
+from sitl.paper import hover, linear, model, motions, page
 from sitl.paper.context import Context
 from sitl.paper.flights import FlightError, Pilot
 from sitl.paper.record import Ledger
@@ -23,6 +23,7 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
     ("The model (section II)", model.section),
     ("Hovering (section III)", hover.section),
     ("The uncontrolled motions (figs. 2 to 5, 12 to 16)", motions.section),
+    ("The linear model, controllability and the gains (section IV, appendix F)", linear.section),
 )
 
 
