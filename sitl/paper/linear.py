@@ -65,7 +65,9 @@ def _appendix_f(context: Context) -> str:
     source = "Appendix F"
     a_error = float(np.abs(at_printed.A - printed_a).max())
     ledger.at_most("appendix_f.A_largest_difference_from_F1", a_error, 1e-12, "", source + "1")
-    ledger.at_most("appendix_f.A_largest_difference_from_F2", a_error, 1e-12, "", source + "2, the same entries")
+    ledger.at_most(
+        "appendix_f.A_largest_difference_from_F2", a_error, 1e-12, "", source + "2, the same entries"
+    )
     b_error = float(np.abs(true.B - printed_b).max())
     ledger.at_most("appendix_f.B_largest_difference_from_F1", b_error, 1e-12, "", source + "1")
     wrench = (thrust, 0.0, 0.0, 0.0)
@@ -76,7 +78,9 @@ def _appendix_f(context: Context) -> str:
     ledger.at_most(
         "appendix_f.largest_difference_from_numeric_jacobian", worst, 1e-6, "", "second simulation's linmod"
     )
-    lateral = ledger.check("appendix_f.lateral_entry_true", float(true.A[6, 3]), 4.952, 5e-4, "1/s²", "errata.md")
+    lateral = ledger.check(
+        "appendix_f.lateral_entry_true", float(true.A[6, 3]), 4.952, 5e-4, "1/s²", "errata.md"
+    )
     ledger.check("appendix_f.lateral_entry_printed", float(at_printed.A[6, 3]), 5.0, 1e-12, "1/s²", source)
     ledger.judge(
         "appendix_f",
@@ -98,7 +102,9 @@ def _appendix_f(context: Context) -> str:
         "Our Jacobian is written down by hand; a numerical one of the second simulation (what linmod does) agrees "
         f"with it to {worst:.0e}. At the paper's point it is Appendix F1 and F2, entry by entry "
         f"(largest difference {max(a_error, b_error):.0e}). Below: all entries that are not kinematic."
-    ) + page.table(("entry of A", "App. F1, F2", "ours at l = 2 m", f"at l = {vehicle.hover_length:g} m"), rows)
+    ) + page.table(
+        ("entry of A", "App. F1, F2", "ours at l = 2 m", f"at l = {vehicle.hover_length:g} m"), rows
+    )
 
 
 def exact_model(vehicle: Vehicle) -> tuple[Rational, Rational]:
@@ -119,13 +125,18 @@ def exact_model(vehicle: Vehicle) -> tuple[Rational, Rational]:
         assert math.isclose(float(nearest), abs(value), rel_tol=1e-12)
         return nearest if value > 0 else -nearest
 
-    return [[exact(v) for v in row] for row in model.A.tolist()], [[exact(v) for v in row] for row in model.B.tolist()]
+    return [[exact(v) for v in row] for row in model.A.tolist()], [
+        [exact(v) for v in row] for row in model.B.tolist()
+    ]
 
 
 def product(a: Rational, b: Rational) -> Rational:
     """a·b in rational numbers."""
     columns = list(zip(*b, strict=True))
-    return [[sum((x * y for x, y in zip(row, c, strict=True) if x and y), Fraction(0)) for c in columns] for row in a]
+    return [
+        [sum((x * y for x, y in zip(row, c, strict=True) if x and y), Fraction(0)) for c in columns]
+        for row in a
+    ]
 
 
 def rank(matrix: Rational) -> int:
@@ -153,10 +164,14 @@ def _controllability(context: Context) -> str:
         blocks.append(product(a, blocks[-1]))
         powers.append(product(a, powers[-1]))
     matrix = [[x for block in blocks for x in block[i]] for i in range(size)]
-    full = int(ledger.check("controllability_rank", rank(matrix), 18, 0, "", "errata.md, eq. 52: exact arithmetic"))
+    full = int(
+        ledger.check("controllability_rank", rank(matrix), 18, 0, "", "errata.md, eq. 52: exact arithmetic")
+    )
     literal_blocks = [*powers[:-1], product(powers[-1], b)]
     literal = [[x for block in literal_blocks for x in block[i]] for i in range(size)]
-    wrong = int(ledger.check("controllability.literal_eq52_rank", rank(literal), 14, 0, "", "errata.md, eq. 52"))
+    wrong = int(
+        ledger.check("controllability.literal_eq52_rank", rank(literal), 14, 0, "", "errata.md, eq. 52")
+    )
     floating = np.array([[float(x) for x in row] for row in matrix])
     condition = float(np.linalg.cond(floating))
     exponent = math.log10(condition)
@@ -191,7 +206,11 @@ def open_loop_modes(vehicle: Vehicle) -> list[tuple[str, complex, int]]:
     bounce = complex(-decay, 0.0) + np.emath.sqrt(decay**2 - cable.stiffness * both)
     return [
         ("bounce: vehicle and load against each other along the cable", complex(bounce), 2),
-        ("pendulum, in x and in y: vehicle and load against each other sideways", 1j * math.sqrt(string * both), 4),
+        (
+            "pendulum, in x and in y: vehicle and load against each other sideways",
+            1j * math.sqrt(string * both),
+            4,
+        ),
         ("drift of the common centre in x, y, z, and of roll, pitch, yaw", 0j, 12),
     ]
 
@@ -202,7 +221,10 @@ def _poles(context: Context) -> str:
     ledger.put("open_loop_poles", sorted_poles(poles))
     rows = []
     for name, key, (meaning, pole, count) in zip(
-        ("bounce", "pendulum", "drift"), ("bounce", "pendulum", "drift"), open_loop_modes(vehicle), strict=True
+        ("bounce", "pendulum", "drift"),
+        ("bounce", "pendulum", "drift"),
+        open_loop_modes(vehicle),
+        strict=True,
     ):
         # Twelve poles at zero in chains of up to four: rounding of 1e-16 moves them by its fourth root.
         tolerance = 1e-3 if name == "drift" else 1e-6
@@ -254,7 +276,9 @@ def _gains(context: Context) -> str:
         ("gains_for_10_on_1", found["K_integral.10"][0], found["K_integral.1"]),
     ):
         worst = float(np.linalg.eigvals(model.A - model.B @ gain).real.max())
-        crossed[key] = ledger.at_least(f"gains.{key}_largest_real_part", worst, 1e-3, "1/s", "errata.md, V.B: unstable")
+        crossed[key] = ledger.at_least(
+            f"gains.{key}_largest_real_part", worst, 1e-3, "1/s", "errata.md, V.B: unstable"
+        )
     ledger.judge(
         "gains.bounce", "V.A, VI", "the oscillation left at the start is due to the linearisation",
         f"its pole is in A exactly, and the weights move it by {100 * moved['K_lqr']:.2f} % "

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.paper import hover, linear, model, motions, page
+from sitl.paper import circling, hover, linear, lqr_hover, model, motions, page, position
 from sitl.paper.context import Context
 from sitl.paper.flights import FlightError, Pilot
 from sitl.paper.record import Ledger
@@ -24,6 +24,9 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
     ("Hovering (section III)", hover.section),
     ("The uncontrolled motions (figs. 2 to 5, 12 to 16)", motions.section),
     ("The linear model, controllability and the gains (section IV, appendix F)", linear.section),
+    ("LQR at hover (section V.A, figs. 8 and 9)", lqr_hover.section),
+    ("To a set-point (section V.B, fig. 10)", position.section),
+    ("Round a circle (section V.C, fig. 11)", circling.section),
 )
 
 
