@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.paper import circling, hover, linear, lqr_hover, model, motions, page, position
+from sitl.paper import circling, hover, linear, lqr_hover, model, motions, page, position, sampling
 from sitl.paper.context import Context
 from sitl.paper.flights import FlightError, Pilot
 from sitl.paper.record import Ledger
@@ -27,6 +27,7 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
     ("LQR at hover (section V.A, figs. 8 and 9)", lqr_hover.section),
     ("To a set-point (section V.B, fig. 10)", position.section),
     ("Round a circle (section V.C, fig. 11)", circling.section),
+    ("The computer in the loop", sampling.section),
 )
 
 
