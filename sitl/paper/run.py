@@ -10,7 +10,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.paper import circling, hover, linear, lqr_hover, model, motions, page, position, sampling
+from sitl.paper import (
+    circling,
+    elasticity,
+    hover,
+    linear,
+    lqr_hover,
+    model,
+    motions,
+    page,
+    position,
+    rigid,
+    sampling,
+)
 from sitl.paper.context import Context
 from sitl.paper.flights import FlightError, Pilot
 from sitl.paper.record import Ledger
@@ -28,6 +40,8 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
     ("To a set-point (section V.B, fig. 10)", position.section),
     ("Round a circle (section V.C, fig. 11)", circling.section),
     ("The computer in the loop", sampling.section),
+    ("The research question: what elasticity does", elasticity.section),
+    ("Rigid design, elastic cable", rigid.section),
 )
 
 
