@@ -40,7 +40,8 @@ def section(context: Context) -> str:
         [Request("circle", "paper", duration, (f"cable.rest_length={length}",)) for length in LENGTHS]
         + [Request("circle", "default", duration, ("cable.rest_length=10",))]
     )
-    others, rows = [], []
+    others: list[second.Run] = []
+    rows: list[tuple[Any, ...]] = []
     for length, flight in zip(LENGTHS, flights, strict=False):
         vehicle, name = flight.vehicle_description, f"figures.11.{length}"
         other = second.fly(vehicle, law(vehicle, around), flight.time)
@@ -78,35 +79,48 @@ def section(context: Context) -> str:
     )
     one, ten = (ledger.numbers["figures"]["11"][length] for length in LENGTHS)
     ledger.judge(
-        "figures.11", "V.C, fig. 11", "“it is able to follow the circle quite well after it has stabilized”",
-        f"in shape: {100 * one['radius_ratio']:.0f} % and {100 * ten['radius_ratio']:.0f} % of the radius (l₀ = 1, 10 m). "
+        "figures.11",
+        "V.C, fig. 11",
+        "“it is able to follow the circle quite well after it has stabilized”",
+        f"in shape: {100 * one['radius_ratio']:.0f} % and {100 * ten['radius_ratio']:.0f} % of the radius "
+        "(l₀ = 1, 10 m). "
         f"In time the load runs {one['phase_lag_deg']:.0f}° and {ten['phase_lag_deg']:.0f}° behind, "
         f"{one['tracking_rms_m']:.1f} and {ten['tracking_rms_m']:.1f} m from where it should be",
-        UNSUPPORTED, "the figure shows no time; a reference through the integrator alone has to lag",
+        UNSUPPORTED,
+        "the figure shows no time; a reference through the integrator alone has to lag",
         ["figures.11.1", "figures.11.10"],
-    )  # fmt: skip
+    )
     return (
         page.figure(
             _draw_circle(flights[1]),
-            "<b>Fig. 11, as the paper draws it</b> (l₀ = 10 m): crosses are the vehicle, circles the load, at the same "
-            f"times, joined by the cable; the last {PERIOD:.1f} s of the flight. A grey line joins load and reference "
+            "<b>Fig. 11, as the paper draws it</b> (l₀ = 10 m): crosses are the vehicle, circles the load, "
+            "at the same "
+            f"times, joined by the cable; the last {PERIOD:.1f} s of the flight. A grey line joins load "
+            "and reference "
             "at one and the same time: what the figure hides.",
             [flights[1].command],
         )
         + page.figure(
             _draw_in_time(flights, others),
-            "<b>The same flights in time.</b> Broad: flown over the link; dashed: the paper's continuous gains in the "
+            "<b>The same flights in time.</b> Broad: flown over the link; dashed: the paper's continuous "
+            "gains in the "
             "second simulation. Below: the load's distance from its reference.",
             [flight.command for flight in flights],
         )
         + page.table(
             (
-                "", "phase lag [°]", "in theory [°]", "radius ratio", "in theory", "rms error [m]",
-                "largest distance from a circle [m]", "between the two [m]",
+                "",
+                "phase lag [°]",
+                "in theory [°]",
+                "radius ratio",
+                "in theory",
+                "rms error [m]",
+                "largest distance from a circle [m]",
+                "between the two [m]",
             ),
             rows,
         )
-    )  # fmt: skip
+    )
 
 
 def last_periods(flight: Flight, periods: int) -> slice:
@@ -115,7 +129,7 @@ def last_periods(flight: Flight, periods: int) -> slice:
 
 
 def lag_and_ratio(flight: Flight, periods: int) -> tuple[float, float, float]:
-    """Phase lag (degrees) and radius of the load relative to its reference, by the first harmonic; rms error, m."""
+    """Phase lag (degrees) and radius of the load over the reference's, by the first harmonic; rms error, m."""
     rows = last_periods(flight, periods)
     turn = np.exp(-2j * math.pi * flight.time[rows] / PERIOD)
     # East and north together: the complex amplitude of a rotation at the reference's own rate.

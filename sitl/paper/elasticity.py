@@ -125,10 +125,7 @@ def _stiffness(context: Context) -> str:
     responses = {k: respond(on(f"cable.stiffness={k!r}")) for k in stiffnesses}
     ledger.put("elasticity", [{"stiffness_N_m": k, **r.row()} for k, r in responses.items()])
     context.say("elasticity: three stiffnesses over the link")
-    requests = [
-        Request("setpoint", "paper", DURATION, ("cable.rest_length=1", f"cable.stiffness={k!r}"))
-        for k in FLOWN
-    ]
+    requests = [Request("setpoint", "paper", DURATION, (f"cable.stiffness={k!r}",)) for k in FLOWN]
     flown_rows = []
     for k, flight in zip(FLOWN, context.pilot.fly(requests), strict=True):
         error = np.linalg.norm(flight.load - np.array(TARGET), axis=1)
@@ -162,28 +159,47 @@ def _stiffness(context: Context) -> str:
         }
     ledger.put("elasticity_findings.thrust_gain_on_heights_of_vehicle_and_load", heights)
     ledger.judge(
-        "elasticity.faster", "VII", "“utilize the elasticity for getting to the desired position quickly”",
+        "elasticity.faster",
+        "VII",
+        "“utilize the elasticity for getting to the desired position quickly”",
         f"with the paper's continuous gains 2 % after {continuous[100.0]:.2f} s at 100 N/m and after "
-        f"{continuous[1e5]:.2f} s at 1e5 N/m", UNSUPPORTED, "a stiff cable is as fast",
+        f"{continuous[1e5]:.2f} s at 1e5 N/m",
+        UNSUPPORTED,
+        "a stiff cable is as fast",
         ["elasticity_findings.settling_1e5_minus_100_N_m_s"],
-    )  # fmt: skip
+    )
     ledger.judge(
-        "elasticity.question", "I, VII", "elasticity affects the behaviour (no figure says how)",
-        "it adds one mode, the bounce, that these weights leave as it is, and a stretch of m_p g/k_a; from about "
-        "1000 N/m on the response is that of a stiff cable", CORRECTED, "shown here over k_a, c_a, l₀ and m_p",
+        "elasticity.question",
+        "I, VII",
+        "elasticity affects the behaviour (no figure says how)",
+        "it adds one mode, the bounce, that these weights leave as it is, and a stretch of m_p g/k_a; from "
+        "about "
+        "1000 N/m on the response is that of a stiff cable",
+        CORRECTED,
+        "shown here over k_a, c_a, l₀ and m_p",
         ["elasticity_findings", "elasticity_flown"],
-    )  # fmt: skip
+    )
     rows = [
         (
-            k, r.stretch, abs(r.bounce) / (2 * math.pi), damping_ratio(r.bounce), damping_ratio(r.bounce_closed),
-            r.pendulum / (2 * math.pi), r.settling, continuous.get(k, ""), r.overshoot, r.peak_tension,
+            k,
+            r.stretch,
+            abs(r.bounce) / (2 * math.pi),
+            damping_ratio(r.bounce),
+            damping_ratio(r.bounce_closed),
+            r.pendulum / (2 * math.pi),
+            r.settling,
+            continuous.get(k, ""),
+            r.overshoot,
+            r.peak_tension,
         )
         for k, r in table.items()
-    ]  # fmt: skip
+    ]
     return (
         page.text(
-            "The experiment is V.B (l₀ = 10 m, Table I otherwise), the paper's weights, gains designed anew for each "
-            f"cable and for {RATE_HZ:g} Hz. Simulated offline with the plant's own equations, rotor limits included; "
+            "The experiment is V.B (l₀ = 10 m, Table I otherwise), the paper's weights, gains designed "
+            "anew for each "
+            f"cable and for {RATE_HZ:g} Hz. Simulated offline with the plant's own equations, rotor limits "
+            "included; "
             "beside it the paper's continuous gains in the second simulation."
         )
         + page.heading("Stiffness")
@@ -194,25 +210,39 @@ def _stiffness(context: Context) -> str:
         )
         + page.table(
             (
-                "k_a [N/m]", "stretch [m]", "bounce [Hz]", "its damping ratio", "in closed loop", "pendulum [Hz]",
-                "2 % settling [s]", "with continuous gains [s]", "overshoot [%]", "peak tension [N]",
+                "k_a [N/m]",
+                "stretch [m]",
+                "bounce [Hz]",
+                "its damping ratio",
+                "in closed loop",
+                "pendulum [Hz]",
+                "2 % settling [s]",
+                "with continuous gains [s]",
+                "overshoot [%]",
+                "peak tension [N]",
             ),
             rows,
         )
         + page.text(
-            f"At 1e5 N/m and {RATE_HZ:g} Hz settling takes {page.number(stiffest.settling)} s, not for the cable's sake: in "
-            "the linear model of so stiff a cable vehicle and load have the same height, and the sampled design "
+            f"At 1e5 N/m and {RATE_HZ:g} Hz settling takes {page.number(stiffest.settling)} s, not for the "
+            "cable's sake: in "
+            "the linear model of so stiff a cable vehicle and load have the same height, and the sampled "
+            "design "
             "splits its gain between the two differently "
-            f"({heights['1e5_N_m']['at_250_hz_N_m'][0]:.0f} and {heights['1e5_N_m']['at_250_hz_N_m'][1]:.0f} N/m, continuous "
-            f"{heights['1e5_N_m']['continuous_N_m'][0]:.0f} and {heights['1e5_N_m']['continuous_N_m'][1]:.0f} N/m); "
-            "but when the load swings out, the heights do differ. With the continuous gains the stiff cable settles "
+            f"({heights['1e5_N_m']['at_250_hz_N_m'][0]:.0f} and "
+            f"{heights['1e5_N_m']['at_250_hz_N_m'][1]:.0f} N/m, continuous "
+            f"{heights['1e5_N_m']['continuous_N_m'][0]:.0f} and "
+            f"{heights['1e5_N_m']['continuous_N_m'][1]:.0f} N/m); "
+            "but when the load swings out, the heights do differ. With the continuous gains the stiff "
+            "cable settles "
             f"after {continuous[1e5]:.2f} s."
         )
         + page.text("Flown over the link, beside the sweep:")
         + page.table(
-            ("k_a [N/m]", "2 % settling, flown [s]", "offline [s]", "peak tension, flown [N]", "offline [N]"), flown_rows
+            ("k_a [N/m]", "2 % settling, flown [s]", "offline [s]", "peak tension, flown [N]", "offline [N]"),
+            flown_rows,
         )
-    )  # fmt: skip
+    )
 
 
 def _others(context: Context) -> str:
@@ -227,30 +257,43 @@ def _others(context: Context) -> str:
             table.append({key.replace(".", "_"): value, **r.row()})
             rows.append(
                 (
-                    value, r.stretch, abs(r.bounce) / (2 * math.pi), damping_ratio(r.bounce),
-                    damping_ratio(r.bounce_closed), r.pendulum / (2 * math.pi),
-                    "diverges" if r.diverged else r.settling, r.overshoot, r.peak_tension,
+                    value,
+                    r.stretch,
+                    abs(r.bounce) / (2 * math.pi),
+                    damping_ratio(r.bounce),
+                    damping_ratio(r.bounce_closed),
+                    r.pendulum / (2 * math.pi),
+                    "diverges" if r.diverged else r.settling,
+                    r.overshoot,
+                    r.peak_tension,
                 )
-            )  # fmt: skip
+            )
         ledger.put(f"elasticity_over.{key.replace('.', '_')}", table)
         blocks.append(
             page.table(
                 (
-                    label, "stretch [m]", "bounce [Hz]", "its damping ratio", "in closed loop", "pendulum [Hz]",
-                    "2 % settling [s]", "overshoot [%]", "peak tension [N]",
+                    label,
+                    "stretch [m]",
+                    "bounce [Hz]",
+                    "its damping ratio",
+                    "in closed loop",
+                    "pendulum [Hz]",
+                    "2 % settling [s]",
+                    "overshoot [%]",
+                    "peak tension [N]",
                 ),
                 rows,
             )
-        )  # fmt: skip
+        )
     return "".join(blocks)
 
 
 def crossed_growth(made_for: Sequence[str], flown_on: Sequence[str]) -> float:
-    """Growth rate, 1/s, of the sampled loop with a controller made for one vehicle on another; below 0: stable."""
+    """Growth rate, 1/s, of the sampled loop, a controller made for one vehicle flying another; below 0: stable."""
     model = with_integrator(linear_model(on(*made_for)))
     gain = sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ))
-    on = with_integrator(linear_model(on(*flown_on)))
-    return math.log(spectral_radius(on, SampledGain(gain.state, gain.past), 1.0 / RATE_HZ, 0)) * RATE_HZ
+    flown = with_integrator(linear_model(on(*flown_on)))
+    return math.log(spectral_radius(flown, SampledGain(gain.state, gain.past), 1.0 / RATE_HZ, 0)) * RATE_HZ
 
 
 def _crossed(context: Context) -> str:
@@ -282,7 +325,8 @@ def _crossed(context: Context) -> str:
         blocks.append(
             page.figure(
                 _draw_crossed(growths, values, label),
-                f"<b>Designed for one {label.split()[0]}, flown on another.</b> Growth rate of the sampled linear loop: "
+                f"<b>Designed for one {label.split()[0]}, flown on another.</b> Growth rate of the sampled "
+                "linear loop: "
                 "blue and negative is stable, red unstable.",
             )
         )

@@ -1,4 +1,4 @@
-"""Flights over the real link: plant and controller as two processes in lockstep, as `sitl fly` launches them."""
+"""Flights over the real link: two processes in lockstep, launched as `sitl fly` launches them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.fly import Pair, watch
 from sitl.flight import FlightOptions
+from sitl.fly import Pair, watch
 from sitl.metrics import reference_positions
 from sitl.report import positions, read_state_log
 from sitl.scenario import load_scenario, scenario_vehicle
@@ -73,7 +73,7 @@ class Request(NamedTuple):
 
 
 AT_ONCE = 2
-"""Flights under way together: in lockstep plant and controller take turns, so that a flight fills one core."""
+"""Flights under way together: in lockstep plant and controller take turns, so a flight fills one core."""
 
 
 class Pilot:

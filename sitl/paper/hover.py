@@ -46,13 +46,20 @@ def section(context: Context) -> str:
         "eq. 17",
     )
     growth = ledger.at_least(
-        "hover.printed_length_growth_rate_1_s", _growth(vehicle, printed_length, thrust), 10.0, "1/s",
+        "hover.printed_length_growth_rate_1_s",
+        _growth(vehicle, printed_length, thrust),
+        10.0,
+        "1/s",
         "errata.md: load balanced above the vehicle",
-    )  # fmt: skip
+    )
     printed_speed = ledger.check(
-        "hover.printed_rotor_speed_rad_s", math.sqrt(thrust / rotor.thrust_coefficient), 2 * 22.147, 1e-3,
-        "rad/s", "eq. 24",
-    )  # fmt: skip
+        "hover.printed_rotor_speed_rad_s",
+        math.sqrt(thrust / rotor.thrust_coefficient),
+        2 * 22.147,
+        1e-3,
+        "rad/s",
+        "eq. 24",
+    )
     share = 4 * rotor.thrust_coefficient * printed_speed**2 / thrust
     ledger.check("hover.printed_rotor_speed_thrust_ratio", share, 4.0, 1e-9, "", "errata.md, eq. 24")
     top, bottom = PRINTED_POINT
@@ -66,23 +73,37 @@ def section(context: Context) -> str:
     ledger.check("hover.steady_length_by_simulation_m", found, length, 1e-6, "m", "Appendix C, 60 s")
 
     ledger.judge(
-        "hover.length", "III, eqs. 16 to 18", f"l = l₀ - m_p g/k_a = {page.number(printed_length)} m",
-        f"{length:.3f} m, also where a 60 s simulation comes to rest", CORRECTED,
+        "hover.length",
+        "III, eqs. 16 to 18",
+        f"l = l₀ - m_p g/k_a = {page.number(printed_length)} m",
+        f"{length:.3f} m, also where a 60 s simulation comes to rest",
+        CORRECTED,
         "ê points down: l = l₀ + m_p g/k_a. The printed root is the load balanced above the vehicle",
-        ["equilibrium.length_m", "hover.printed_length_m", "hover.printed_length_growth_rate_1_s",
-         "hover.steady_length_by_simulation_m"],
-    )  # fmt: skip
+        [
+            "equilibrium.length_m",
+            "hover.printed_length_m",
+            "hover.printed_length_growth_rate_1_s",
+            "hover.steady_length_by_simulation_m",
+        ],
+    )
     ledger.judge(
-        "hover.rotor_speed", "III, eq. 24", f"ω = √((m_v+m_p) g/c_t) = {page.number(printed_speed)} rad/s",
-        f"{speed:.3f} rad/s", CORRECTED, "four rotors share the thrust: c_t is 4 c_t",
+        "hover.rotor_speed",
+        "III, eq. 24",
+        f"ω = √((m_v+m_p) g/c_t) = {page.number(printed_speed)} rad/s",
+        f"{speed:.3f} rad/s",
+        CORRECTED,
+        "four rotors share the thrust: c_t is 4 c_t",
         ["equilibrium.rotor_speed_rad_s", "hover.printed_rotor_speed_thrust_ratio"],
-    )  # fmt: skip
+    )
     ledger.judge(
-        "hover.printed_point", "IV.A", f"x* with z_v = {top} m, z_p = {bottom} m is an equilibrium",
-        f"vehicle and load accelerate there by {up:.2f} and {down:+.2f} m/s²", UNSUPPORTED,
-        "l = 2 m is rounded from 1.981 m", ["hover.printed_point_vehicle_acceleration_m_s2",
-                                            "hover.printed_point_load_acceleration_m_s2"],
-    )  # fmt: skip
+        "hover.printed_point",
+        "IV.A",
+        f"x* with z_v = {top} m, z_p = {bottom} m is an equilibrium",
+        f"vehicle and load accelerate there by {up:.2f} and {down:+.2f} m/s²",
+        UNSUPPORTED,
+        "l = 2 m is rounded from 1.981 m",
+        ["hover.printed_point_vehicle_acceleration_m_s2", "hover.printed_point_load_acceleration_m_s2"],
+    )
     rows = [
         ("17", "l = l₀ - m_p g/k_a", printed_length, "l = l₀ + m_p g/k_a", length, "m"),
         ("18, 19", "T = (m_v + m_p) g", thrust, "the same", thrust, "N"),
@@ -94,16 +115,22 @@ def section(context: Context) -> str:
     ]
     return (
         page.text(
-            "Hovering, the thrust carries both masses and the cable carries the load: it is longer than l₀ by "
-            f"m_p g/k_a = {page.number(load_mass * g / cable.stiffness)} m. The paper has ê pointing up, so that its root "
-            "is a load that stands on the cable above the vehicle: an equilibrium too, but one that falls over, "
+            "Hovering, the thrust carries both masses and the cable carries the load: it is longer than l₀ "
+            "by "
+            f"m_p g/k_a = {page.number(load_mass * g / cable.stiffness)} m. The paper has ê pointing up, "
+            "so that its root "
+            "is a load that stands on the cable above the vehicle: an equilibrium too, but one that falls "
+            "over, "
             f"growing by {page.number(growth)} 1/s."
         )
         + page.table(("eq.", "as printed", "value", "corrected", "value", "unit"), rows)
         + page.text(
-            f"Rotors at the printed speed of eq. 24 would give {page.number(share)} times hover thrust. The point "
-            f"[z_v, z_p] = [{top}, {bottom}] m that section IV.A linearises at is no equilibrium: vehicle and load "
-            f"accelerate towards each other by {page.number(abs(up))} m/s² each. Masses: {mass:g} and {load_mass:g} kg."
+            f"Rotors at the printed speed of eq. 24 would give {page.number(share)} times hover thrust. "
+            "The point "
+            f"[z_v, z_p] = [{top}, {bottom}] m that section IV.A linearises at is no equilibrium: vehicle "
+            "and load "
+            f"accelerate towards each other by {page.number(abs(up))} m/s² each. Masses: {mass:g} and "
+            f"{load_mass:g} kg."
         )
     )
 

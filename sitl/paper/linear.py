@@ -20,7 +20,26 @@ from sitl_bridge.vehicle import Vehicle, load_vehicle
 Array = NDArray[np.float64]
 Rational = list[list[Fraction]]
 
-STATES = "x_v y_v z_v x_p y_p z_p ẋ_v ẏ_v ż_v ẋ_p ẏ_p ż_p p q r φ θ ψ".split()
+STATES = [
+    "x_v",
+    "y_v",
+    "z_v",
+    "x_p",
+    "y_p",
+    "z_p",
+    "ẋ_v",
+    "ẏ_v",
+    "ż_v",
+    "ẋ_p",
+    "ẏ_p",
+    "ż_p",
+    "p",
+    "q",
+    "r",
+    "φ",
+    "θ",
+    "ψ",
+]
 PRINTED_LENGTH = 2.0
 """l of the point that Appendix F is printed for, m."""
 
@@ -99,7 +118,8 @@ def _appendix_f(context: Context) -> str:
             (f"[{STATES[i]}', {STATES[j]}]", printed_a[i, j], at_printed.A[i, j].item(), true.A[i, j].item())
         )
     return page.text(
-        "Our Jacobian is written down by hand; a numerical one of the second simulation (what linmod does) agrees "
+        "Our Jacobian is written down by hand; a numerical one of the second simulation (what linmod does) "
+        "agrees "
         f"with it to {worst:.0e}. At the paper's point it is Appendix F1 and F2, entry by entry "
         f"(largest difference {max(a_error, b_error):.0e}). Below: all entries that are not kinematic."
     ) + page.table(
@@ -184,16 +204,21 @@ def _controllability(context: Context) -> str:
     )
     ledger.at_least("controllability.pbh_smallest_singular_value", pbh, 1e-3, "", "above rounding: full rank")
     ledger.judge(
-        "controllability", "IV.B, eq. 52", "full rank, so controllable",
-        f"rank {full} of 18, in exact arithmetic and by the PBH test", CORRECTED,
+        "controllability",
+        "IV.B, eq. 52",
+        "full rank, so controllable",
+        f"rank {full} of 18, in exact arithmetic and by the PBH test",
+        CORRECTED,
         f"the matrix is [B AB … A¹⁷B]; as printed, [A A² … AⁿB], it has rank {wrong}",
         ["controllability", "controllability_rank"],
-    )  # fmt: skip
+    )
     return page.heading("Controllability") + page.text(
         f"[B AB … A¹⁷B] has rank <b>{full}</b>, by elimination in rational numbers. Its condition number is "
-        f"10^{exponent:.1f}, so that a floating-point rank is no proof. The PBH test needs no such matrix: the "
+        f"10^{exponent:.1f}, so that a floating-point rank is no proof. The PBH test needs no such matrix: "
+        "the "
         "smallest singular value of [λ1 - A, B] over all poles λ is "
-        f"{page.number(pbh)}, far above rounding. Eq. 52 as printed gives rank {wrong}, and says nothing about B."
+        f"{page.number(pbh)}, far above rounding. Eq. 52 as printed gives rank {wrong}, and says nothing "
+        "about B."
     )
 
 
@@ -237,8 +262,10 @@ def _poles(context: Context) -> str:
         page.heading("Open-loop poles")
         + page.table(("pole [1/s]", "how many", "meaning", "frequency [Hz]", "damping ratio"), rows)
         + page.text(
-            "Nothing damps the pendulum: the thrust is fixed to the vehicle, and air drag is not in the model. The "
-            "zeros form chains (moment, rate, tilt, acceleration, position): the vehicle drifts away in any direction."
+            "Nothing damps the pendulum: the thrust is fixed to the vehicle, and air drag is not in the "
+            "model. The "
+            "zeros form chains (moment, rate, tilt, acceleration, position): the vehicle drifts away in "
+            "any direction."
         )
     )
 
@@ -256,10 +283,12 @@ def _gains(context: Context) -> str:
     ledger = context.ledger
     near, far = load_vehicle("paper"), load_vehicle("paper", ["cable.rest_length=10"])
     bounce = open_loop_modes(near)[0][1]
-    closed: dict[str, Array] = {}
+    closed: dict[str, Any] = {}
     found: dict[str, tuple[Array, LinearModel]] = {
-        "K_lqr": gains(near, False), "K_integral.1": gains(near, True), "K_integral.10": gains(far, True)
-    }  # fmt: skip
+        "K_lqr": gains(near, False),
+        "K_integral.1": gains(near, True),
+        "K_integral.10": gains(far, True),
+    }
     for key, (gain, model) in found.items():
         ledger.put(key, gain)
         closed[key] = np.linalg.eigvals(model.A - model.B @ gain)
@@ -280,26 +309,39 @@ def _gains(context: Context) -> str:
             f"gains.{key}_largest_real_part", worst, 1e-3, "1/s", "errata.md, V.B: unstable"
         )
     ledger.judge(
-        "gains.bounce", "V.A, VI", "the oscillation left at the start is due to the linearisation",
+        "gains.bounce",
+        "V.A, VI",
+        "the oscillation left at the start is due to the linearisation",
         f"its pole is in A exactly, and the weights move it by {100 * moved['K_lqr']:.2f} % "
         f"(V.A) and {100 * moved['K_integral.10']:.1f} % (V.B)",
-        UNSUPPORTED, "with R = 1 per N² thrust is too dear to be spent on it",
+        UNSUPPORTED,
+        "with R = 1 per N² thrust is too dear to be spent on it",
         ["gains.K_lqr.bounce_pole_moved_by", "gains.K_integral.10.bounce_pole_moved_by"],
-    )  # fmt: skip
+    )
     ledger.judge(
-        "gains.length", "V.B", "l₀ is raised to 10 m (gains not mentioned)",
-        f"gains for l₀ = 1 m are unstable on 10 m (+{crossed['gains_for_1_on_10']:.2f} 1/s) and the other way "
+        "gains.length",
+        "V.B",
+        "l₀ is raised to 10 m (gains not mentioned)",
+        f"gains for l₀ = 1 m are unstable on 10 m (+{crossed['gains_for_1_on_10']:.2f} 1/s) and the other "
+        "way "
         f"round (+{crossed['gains_for_10_on_1']:.2f} 1/s)",
-        CORRECTED, "the gains have to be designed for the l₀ that they fly",
+        CORRECTED,
+        "the gains have to be designed for the l₀ that they fly",
         ["gains.gains_for_1_on_10_largest_real_part", "gains.gains_for_10_on_1_largest_real_part"],
-    )  # fmt: skip
+    )
     ledger.judge(
-        "gains.exist", "IV.C, IV.D, eqs. 53 to 56", "an LQR, and one with the integral of the load's position",
-        "both stable, their gains and poles in paper.json", CORRECTED,
+        "gains.exist",
+        "IV.C, IV.D, eqs. 53 to 56",
+        "an LQR, and one with the integral of the load's position",
+        "both stable, their gains and poles in paper.json",
+        CORRECTED,
         "eqs. 54 to 56: v = ∫(p_p - p_ref), x - x*; G = [0 1 0]; eq. 53: the whole state, not x_v",
-        ["gains.K_lqr.largest_real_part", "gains.K_integral.1.largest_real_part",
-         "gains.K_integral.10.largest_real_part"],
-    )  # fmt: skip
+        [
+            "gains.K_lqr.largest_real_part",
+            "gains.K_integral.1.largest_real_part",
+            "gains.K_integral.10.largest_real_part",
+        ],
+    )
     return (
         page.heading("Gains and closed-loop poles")
         + page.figure(
@@ -309,12 +351,14 @@ def _gains(context: Context) -> str:
             f"(at {complex_text(bounce)}) stays.",
         )
         + page.text("The gains, with 4 rows [ΣT, M_x, M_y, M_z] and columns in the order of eq. 31 (then ∫):")
-        + "".join(page.listing(np.array2string(k, precision=4, suppress_small=True, max_line_width=160), key)
-                  for key, (k, _) in found.items())
-    )  # fmt: skip
+        + "".join(
+            page.listing(np.array2string(k, precision=4, suppress_small=True, max_line_width=160), key)
+            for key, (k, _) in found.items()
+        )
+    )
 
 
-def _draw_poles(open_loop: Array, closed: dict[str, Array]) -> bytes:
+def _draw_poles(open_loop: Any, closed: dict[str, Any]) -> bytes:
     figure, axes = plots.panels(1, height=3.6)
     ax: Any = axes[0, 0]
     ax.plot(open_loop.real, open_loop.imag, "x", color=plots.REFERENCE, ms=9, label="open loop, l₀ = 1 m")
@@ -332,7 +376,7 @@ def _draw_poles(open_loop: Array, closed: dict[str, Array]) -> bytes:
     return plots.png(figure)
 
 
-def sorted_poles(poles: Array) -> list[complex]:
+def sorted_poles(poles: Any) -> list[complex]:
     """Poles from the fastest decay to the slowest."""
     return sorted((complex(p) for p in poles), key=lambda p: (round(p.real, 9), p.imag))
 

@@ -117,32 +117,48 @@ def _figure_8(context: Context) -> str:
         "V.A: 5 s",
     )
     ledger.at_least(
-        "figures.8.rest_length_height_after_5_s_m", eight["rest_length"]["load_deviation_after_5_s_m"], 0.1, "m",
+        "figures.8.rest_length_height_after_5_s_m",
+        eight["rest_length"]["load_deviation_after_5_s_m"],
+        0.1,
+        "m",
         "slow pole of the gains",
-    )  # fmt: skip
+    )
     slow = -max(p[0] for p in ledger.numbers["closed_loop_poles"]["K_lqr"])
     ledger.judge(
-        "figures.8", "V.A, fig. 8", "“after about 5 s it has reached its equilibrium position and is stable”",
-        "true of the bounce, from every start; the height takes longer wherever it begins away from x*: from l = l₀ "
+        "figures.8",
+        "V.A, fig. 8",
+        "“after about 5 s it has reached its equilibrium position and is stable”",
+        "true of the bounce, from every start; the height takes longer wherever it begins away from x*: "
+        "from l = l₀ "
         f"the load is still {eight['rest_length']['load_deviation_after_5_s_m']:.2f} m off after 5 s",
         CORRECTED,
         f"“all initial conditions 0” gives l = 0, which is singular; x* and l = l₀ differ. The gains' slow "
         f"pole decays with {slow:.2f} 1/s",
         ["figures.8"],
-    )  # fmt: skip
-    return page.heading("Fig. 8: hover without disturbance") + page.figure(
-        _draw_heights(list(STARTS.values()), flights, others),
-        "<b>Fig. 8.</b> Flown over the link at 250 Hz (broad), and the paper's continuous law in the second "
-        "simulation (dashed), from each of the starts that the text could mean. The text sets all initial "
-        "conditions to 0, which would put the load into the vehicle.",
-        [flight.command for flight in flights],
-    ) + page.table(
-        (
-            "start", "largest deviation of the load [m]", "largest after 5 s [m]", "largest stretch after 5 s [m]",
-            "at the end [m]", "between the two simulations [m]",
-        ),
-        rows,
-    )  # fmt: skip
+    )
+    return (
+        page.heading("Fig. 8: hover without disturbance")
+        + page.figure(
+            _draw_heights(list(STARTS.values()), flights, others),
+            "<b>Fig. 8.</b> Flown over the link at 250 Hz (broad), and the paper's continuous law in the "
+            "second "
+            "simulation (dashed), from each of the starts that the text could mean. The text sets all "
+            "initial "
+            "conditions to 0, which would put the load into the vehicle.",
+            [flight.command for flight in flights],
+        )
+        + page.table(
+            (
+                "start",
+                "largest deviation of the load [m]",
+                "largest after 5 s [m]",
+                "largest stretch after 5 s [m]",
+                "at the end [m]",
+                "between the two simulations [m]",
+            ),
+            rows,
+        )
+    )
 
 
 def largest_difference(flight: Flight, other: second.Run) -> float:
@@ -194,17 +210,21 @@ def _figure_9(context: Context) -> str:
     )
     bold = ledger.at_least("figures.9.force_for_2_sigma_in_band_N", BAND / (2 * worst), 5.0, "N", "errata.md")
     ledger.judge(
-        "figures.9", "V.A, fig. 9", "under Gaussian noise on the load x, y and z stay within 0.25 m",
+        "figures.9",
+        "V.A, fig. 9",
+        "under Gaussian noise on the load x, y and z stay within 0.25 m",
         f"they do at {FORCE_STD:g} N, drawn anew every 10 ms; 0.25 m is three standard deviations at "
         f"{cautious:.1f} N, two at {bold:.1f} N",
-        CORRECTED, "the paper gives neither the noise's size nor its bandwidth; about 5 N fits",
+        CORRECTED,
+        "the paper gives neither the noise's size nor its bandwidth; about 5 N fits",
         ["figures.9"],
-    )  # fmt: skip
+    )
     return (
         page.heading("Fig. 9: hover with noise on the load")
         + page.figure(
             _draw_noise(list(starts.values()), flights, others),
-            f"<b>Fig. 9.</b> A white force of {FORCE_STD:g} N standard deviation on each axis of the load, held for "
+            f"<b>Fig. 9.</b> A white force of {FORCE_STD:g} N standard deviation on each axis of the load, "
+            "held for "
             "10 ms. Deviations from hover; red: 0.25 m. The second simulation (dashed) gets the same force.",
             [flight.command for flight in flights],
         )
@@ -222,7 +242,8 @@ def _figure_9(context: Context) -> str:
         + page.text(
             "In the linear model the load's standard deviations are "
             + ", ".join(f"{FORCE_STD * s:.3f}" for s in std[3:6])
-            + f" m, the vehicle's height's {FORCE_STD * std[2]:.3f} m. Three standard deviations of the worst reach "
+            + f" m, the vehicle's height's {FORCE_STD * std[2]:.3f} m. Three standard deviations of the "
+            "worst reach "
             f"{BAND} m at a force of {cautious:.2f} N, two at {bold:.2f} N: “within {BAND} m” fits about 5 N."
         )
     )
@@ -232,7 +253,7 @@ def held_forces(flight: Flight) -> Array:
     """The force on the load in each hold time (n, 3), N, read off the log at the first tick in it."""
     count = round(float(flight.time[-1]) / HOLD_TIME)
     first = np.searchsorted(flight.time, np.arange(count) * HOLD_TIME - 1e-9)
-    return flight.force_on_load[first]
+    return np.asarray(flight.force_on_load[first])
 
 
 def stationary_std(vehicle: Vehicle) -> Array:
@@ -250,7 +271,7 @@ def stationary_std(vehicle: Vehicle) -> Array:
 
 def _hover_position(flight: Flight) -> Array:
     """Where the vehicle hovers above the reference, (n, 3), m."""
-    return flight.reference + np.array([0.0, 0.0, flight.vehicle_description.hover_length])
+    return np.asarray(flight.reference + np.array([0.0, 0.0, flight.vehicle_description.hover_length]))
 
 
 def _steady_state(context: Context) -> str:
@@ -279,12 +300,16 @@ def _steady_state(context: Context) -> str:
     )
     kilo = actual.load.mass - believed.load.mass
     ledger.judge(
-        "steady_state", "IV.D", "the LQR has a large steady-state error away from the equilibrium; the integrator "
-        "removes it",
-        f"a load heavier by {kilo:g} kg than the controller believes hangs {abs(left):.2f} m too low; with the "
+        "steady_state",
+        "IV.D",
+        "the LQR has a large steady-state error away from the equilibrium; the integrator removes it",
+        f"a load heavier by {kilo:g} kg than the controller believes hangs {abs(left):.2f} m too low; with "
+        "the "
         f"integrator {1e3 * abs(float(integral.load[-1, 2])):.2g} mm",
-        REPRODUCED, "", ["steady_state"],
-    )  # fmt: skip
+        REPRODUCED,
+        "",
+        ["steady_state"],
+    )
     figure, axes = plots.panels(1, height=2.8)
     ax: Any = axes[0, 0]
     plots.reference(ax, plain.time, plain.reference[:, 2])
@@ -302,7 +327,8 @@ def _steady_state(context: Context) -> str:
     ax.legend(fontsize="small")
     return page.heading("Why the integrator") + page.figure(
         plots.png(figure),
-        f"<b>Steady-state error.</b> The plant's load is {kilo:g} kg heavier than the controller knows. The LQR "
+        f"<b>Steady-state error.</b> The plant's load is {kilo:g} kg heavier than the controller knows. "
+        "The LQR "
         f"holds it {abs(left):.2f} m too low (statics: {abs(float(sag)):.2f} m).",
         [plain.command, integral.command],
     )

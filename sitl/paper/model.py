@@ -27,7 +27,12 @@ EQUATIONS = (
         "sitl_bridge/frames.py; a unit quaternion in the plant",
     ),
     ("3, 4, 7, 8", "M p̈ = F_g + F_t + F_c", "as printed", "plant/dynamics.py"),
-    ("5, 6, 12, 13", "T_i = c_T ω_i², Q_i = c_Q ω_i²; moments from the layout", "as printed", "plant/dynamics.py"),
+    (
+        "5, 6, 12, 13",
+        "T_i = c_T ω_i², Q_i = c_Q ω_i²; moments from the layout",
+        "as printed",
+        "plant/dynamics.py",
+    ),
     (
         "9",
         "F = k_a (l - l₀) + c_a v_r, v_r “the absolute relative velocity”",
@@ -36,7 +41,12 @@ EQUATIONS = (
         "plant/cable.py",
     ),
     ("10, 11", "I ω̇ = U - ω × I ω", "as printed", "plant/dynamics.py"),
-    ("14, 15", "rates from and to Euler angles", "as printed (for angles about X, Y, Z)", "second simulation"),
+    (
+        "14, 15",
+        "rates from and to Euler angles",
+        "as printed (for angles about X, Y, Z)",
+        "second simulation",
+    ),
     ("40 to 45", "missing dots; 1/m_p on the left in 44", "as eq. 3", "plant/dynamics.py"),
     (
         "49 to 51",
@@ -44,7 +54,7 @@ EQUATIONS = (
         "φ̇ = p + q sφ tθ + r cφ tθ; θ̇ = q cφ - r sφ; ψ̇ = (q sφ + r cφ)/cθ",
         "second simulation",
     ),
-)  # fmt: skip
+)
 
 
 def section(context: Context) -> str:
@@ -79,19 +89,26 @@ def section(context: Context) -> str:
     )
     return (
         page.text(
-            "A quadrotor (position r_v, mass m_v, rigid, rotors on the body's axes) carries a point mass (r_p, m_p) on "
+            "A quadrotor (position r_v, mass m_v, rigid, rotors on the body's axes) carries a point mass "
+            "(r_p, m_p) on "
             "a cable that is fixed to its centre of mass. World: east, north, up; body: forward, left, up. "
-            "φ, θ, ψ are roll, pitch and yaw; e is the unit vector from vehicle to load, l the cable's length. "
+            "φ, θ, ψ are roll, pitch and yaw; e is the unit vector from vehicle to load, l the cable's "
+            "length. "
             "The cable pulls the vehicle by +F e and the load by -F e."
         )
         + page.table(("eq.", "as printed", "as implemented", "where"), EQUATIONS)
         + page.text(
-            f"That these are corrections shows in numbers, at φ, θ, ψ = {ANGLES} rad. The printed eq. 2 is no rotation "
+            f"That these are corrections shows in numbers, at φ, θ, ψ = {ANGLES} rad. The printed eq. 2 is "
+            "no rotation "
             f"(‖RᵀR - 1‖ = {page.number(m['eq2']['printed_orthogonality_error'])}), the corrected one is, to "
-            f"{m['eq2']['corrected_orthogonality_error']:.0e}. Eqs. 49 to 51 as printed miss the true Euler rates by "
-            f"{page.number(m['eqs49_51']['printed_error_rad_s'])} rad/s at p, q, r = {RATES.tolist()} rad/s, corrected "
-            f"by {m['eqs49_51']['corrected_error_rad_s']:.0e}. With the “absolute” velocity in eq. 9, a cable "
-            f"that shortens at 1 m/s would pump {page.number(m['eq9']['printed_damping_power_W'])} W into the bodies; "
+            f"{m['eq2']['corrected_orthogonality_error']:.0e}. Eqs. 49 to 51 as printed miss the true "
+            "Euler rates by "
+            f"{page.number(m['eqs49_51']['printed_error_rad_s'])} rad/s at p, q, r = {RATES.tolist()} "
+            "rad/s, corrected "
+            f"by {m['eqs49_51']['corrected_error_rad_s']:.0e}. With the “absolute” velocity in eq. 9, a "
+            "cable "
+            f"that shortens at 1 m/s would pump {page.number(m['eq9']['printed_damping_power_W'])} W into "
+            "the bodies; "
             f"with the signed one, damping takes {page.number(-m['eq9']['signed_damping_power_W'])} W out."
         )
     )

@@ -57,9 +57,12 @@ def section(context: Context) -> str:
     """The section's content."""
     blocks = [
         page.text(
-            "Two simulations of each motion. Broad and pale: the plant that everything else on this page flies "
-            "(east-north-up, quaternion, Runge-Kutta at 1 ms). Thin and dashed: a second one that shares no code "
-            "with it (north-east-down, body axes forward-right-down, Euler angles, DOP853 at 1e-10), as the paper's "
+            "Two simulations of each motion. Broad and pale: the plant that everything else on this page "
+            "flies "
+            "(east-north-up, quaternion, Runge-Kutta at 1 ms). Thin and dashed: a second one that shares "
+            "no code "
+            "with it (north-east-down, body axes forward-right-down, Euler angles, DOP853 at 1e-10), as "
+            "the paper's "
             "6-DoF block is. Where one sees a single line, they agree; the number says how well."
         )
     ]
@@ -70,26 +73,43 @@ def section(context: Context) -> str:
     moments = [k for k in CASES if any(CASES[k].signs)]
     worst = max(ledger.numbers["figures"][k]["largest_difference_m"] for k in CASES)
     ledger.judge(
-        "figures.2", "III.A, fig. 2", "without input both fall, only z changes",
-        "both fall; their common centre with g. From equilibrium the stretched cable first pulls them together",
-        REPRODUCED, "", ["figures.2"],
-    )  # fmt: skip
+        "figures.2",
+        "III.A, fig. 2",
+        "without input both fall, only z changes",
+        "both fall; their common centre with g. From equilibrium the stretched cable first pulls them "
+        "together",
+        REPRODUCED,
+        "",
+        ["figures.2"],
+    )
     three, four = ledger.numbers["figures"]["3"], ledger.numbers["figures"]["4"]
     ledger.judge(
-        "figures.3", "III.A, fig. 3", "without damping vehicle and load oscillate against each other, undiminished",
-        f"{three['frequency_hz']:.4f} Hz, damping ratio {abs(three['damping_ratio']):.0e}", REPRODUCED, "", ["figures.3"],
-    )  # fmt: skip
+        "figures.3",
+        "III.A, fig. 3",
+        "without damping vehicle and load oscillate against each other, undiminished",
+        f"{three['frequency_hz']:.4f} Hz, damping ratio {abs(three['damping_ratio']):.0e}",
+        REPRODUCED,
+        "",
+        ["figures.3"],
+    )
     ledger.judge(
-        "figures.4", "III.A, fig. 4", "with damping an equilibrium is reached",
-        f"{four['frequency_hz']:.4f} Hz, damping ratio {four['damping_ratio']:.4f}, as theory says", REPRODUCED,
-        "", ["figures.4"],
-    )  # fmt: skip
+        "figures.4",
+        "III.A, fig. 4",
+        "with damping an equilibrium is reached",
+        f"{four['frequency_hz']:.4f} Hz, damping ratio {four['damping_ratio']:.4f}, as theory says",
+        REPRODUCED,
+        "",
+        ["figures.4"],
+    )
     ledger.judge(
-        "figures.moments", "III.A and App. A, figs. 5, 12 to 16",
+        "figures.moments",
+        "III.A and App. A, figs. 5, 12 to 16",
         "a moment turns the vehicle about its axis, with the right sign; both implementations agree",
-        f"signs and angles as theory says; the two simulations differ by at most {worst:.0e} m", REPRODUCED, "",
+        f"signs and angles as theory says; the two simulations differ by at most {worst:.0e} m",
+        REPRODUCED,
+        "",
         [f"figures.{k}" for k in moments],
-    )  # fmt: skip
+    )
     return "".join(blocks)
 
 

@@ -104,24 +104,34 @@ def _figure_10(context: Context) -> str:
     rows.append(("our default design, l₀ = 10 m", *(metrics[key] for key in keys), ""))
     ten = ledger.numbers["figures"]["10"]["10"]
     ledger.judge(
-        "figures.10", "V.B, fig. 10", "the load reaches [3, 5, 2] in about eight seconds, with no steady-state error",
+        "figures.10",
+        "V.B, fig. 10",
+        "the load reaches [3, 5, 2] in about eight seconds, with no steady-state error",
         f"2 % after {ten['settling_time_2pct_s']:.2f} s, 1 cm after {ten['settling_time_1cm_s']:.2f} s, "
         f"{ten['overshoot_pct']:.0f} % overshoot in z, "
-        f"{1e3 * ten['steady_state_error_m']:.2g} mm left after 20 s", CORRECTED,
-        "with gains for l₀ = 10 m, and the reference through the integrator alone", ["figures.10.10", "figures.10.1"],
-    )  # fmt: skip
+        f"{1e3 * ten['steady_state_error_m']:.2g} mm left after 20 s",
+        CORRECTED,
+        "with gains for l₀ = 10 m, and the reference through the integrator alone",
+        ["figures.10.10", "figures.10.1"],
+    )
     return (
         page.heading("Fig. 10: to the set-point [3, 5, 2]")
         + page.figure(
             _draw_setpoint(flights, others),
-            "<b>Fig. 10.</b> The paper's weights, gains designed for the cable that flies. Broad: flown over the "
-            "link at 250 Hz; dashed: the paper's continuous gains in the second simulation. The oscillation of "
+            "<b>Fig. 10.</b> The paper's weights, gains designed for the cable that flies. Broad: flown "
+            "over the "
+            "link at 250 Hz; dashed: the paper's continuous gains in the second simulation. The "
+            "oscillation of "
             "the cable at the start is the bounce.",
             [flight.command for flight in flights[:2]],
         )
         + page.table(
             (
-                "", "2 % settling [s]", "1 cm settling [s]", "overshoot, worst axis [%]", "steady-state error [m]",
+                "",
+                "2 % settling [s]",
+                "1 cm settling [s]",
+                "overshoot, worst axis [%]",
+                "steady-state error [m]",
                 "between the two [m]",
             ),
             rows,
@@ -129,10 +139,11 @@ def _figure_10(context: Context) -> str:
         + page.text(
             f"For comparison the <code>default</code> design, which follows a feasible path: "
             f"<code>{flights[2].command}</code>. The rotors reach at most "
-            f"{100 * ten['largest_rotor_share']:.0f} % of their largest speed, and the cable never goes slack: "
+            f"{100 * ten['largest_rotor_share']:.0f} % of their largest speed, and the cable never goes "
+            "slack: "
             f"tension stays between {ten['tension_N'][0]:.0f} and {ten['tension_N'][1]:.0f} N."
         )
-    )  # fmt: skip
+    )
 
 
 def rotor_share(flight: Flight) -> float:
@@ -178,24 +189,37 @@ def _ways_in(context: Context) -> str:
     literal = literal._replace(u_star=literal.u_star + literal.gain[:, 18:] @ np.array(TARGET))
     final = second.fly(vehicle, literal, times).load[-1]
     ledger.at_most(
-        "reference.literal_eq54_final_distance_from_origin_m", float(np.linalg.norm(final)), 0.02, "m",
+        "reference.literal_eq54_final_distance_from_origin_m",
+        float(np.linalg.norm(final)),
+        0.02,
+        "m",
         "errata.md: the load returns to 0",
-    )  # fmt: skip
+    )
     ledger.judge(
-        "reference.jump", "IV.D", "“a reference state can be given as input”: x* may jump with the reference",
-        "V.B and V.C diverge on both cables, with and without rotor limits", UNSUPPORTED,
-        "the reference has to enter through the integrator alone, x* staying where it is", ["reference.x_star_jumps"],
-    )  # fmt: skip
+        "reference.jump",
+        "IV.D",
+        "“a reference state can be given as input”: x* may jump with the reference",
+        "V.B and V.C diverge on both cables, with and without rotor limits",
+        UNSUPPORTED,
+        "the reference has to enter through the integrator alone, x* staying where it is",
+        ["reference.x_star_jumps"],
+    )
     ledger.judge(
-        "reference.literal", "IV.D, eqs. 54, 56", "v = ∫p_p, and v - v_ref with v_ref the set-point",
-        f"the load returns to the origin, to {float(np.linalg.norm(final)):.1g} m", CORRECTED,
-        "v = ∫(p_p - p_ref)", ["reference.literal_eq54_final_distance_from_origin_m"],
-    )  # fmt: skip
+        "reference.literal",
+        "IV.D, eqs. 54, 56",
+        "v = ∫p_p, and v - v_ref with v_ref the set-point",
+        f"the load returns to the origin, to {float(np.linalg.norm(final)):.1g} m",
+        CORRECTED,
+        "v = ∫(p_p - p_ref)",
+        ["reference.literal_eq54_final_distance_from_origin_m"],
+    )
     return (
         page.heading("How the reference may enter")
         + page.text(
-            "The paper does not say whether x* moves with the reference. If it does, the step tilts the vehicle "
-            "over. Below: when the second simulation, without rotor limits, passes 80° of pitch, and when the "
+            "The paper does not say whether x* moves with the reference. If it does, the step tilts the "
+            "vehicle "
+            "over. Below: when the second simulation, without rotor limits, passes 80° of pitch, and when "
+            "the "
             "vehicle with rotor limits has lost its load (1 km away). Simulated offline."
         )
         + page.table(("case, x* jumping", "tips over after [s]", "lost, with rotor limits, after [s]"), rows)

@@ -51,16 +51,16 @@ class Ledger:
     ) -> float:
         """Record a number that should be within `tolerance` of `expected`; returns it. source: of the expectation."""
         within = math.isfinite(value) and abs(value - expected) <= tolerance
-        return self._check(key, value, expected, f"± {tolerance:.3g}", tolerance, within, unit, source)
+        return float(self._check(key, value, expected, f"± {tolerance:.3g}", tolerance, within, unit, source))
 
     def at_most(self, key: str, value: float, bound: float, unit: str = "", source: str = "") -> float:
         """Record a number that should not exceed a bound; returns it."""
         within = math.isfinite(value) and value <= bound
-        return self._check(key, value, bound, "at most", None, within, unit, source)
+        return float(self._check(key, value, bound, "at most", None, within, unit, source))
 
     def at_least(self, key: str, value: float, bound: float, unit: str = "", source: str = "") -> float:
         """Record a number that should reach a bound; returns it."""
-        return self._check(key, value, bound, "at least", None, value >= bound, unit, source)
+        return float(self._check(key, value, bound, "at least", None, value >= bound, unit, source))
 
     def true(self, key: str, value: bool, source: str = "") -> bool:
         """Record something that should be so; returns it."""

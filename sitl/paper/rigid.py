@@ -128,32 +128,55 @@ def section(context: Context) -> str:
     )
     ledger.at_most(
         f"{name}.vehicle_height.largest_growth_above_100_N_m_1_s",
-        float(growths["vehicle"][grid >= 100.0].max()), -0.05, "1/s", "collocated",
-    )  # fmt: skip
+        float(growths["vehicle"][grid >= 100.0].max()),
+        -0.05,
+        "1/s",
+        "collocated",
+    )
     stretch = vehicle.hover_length - vehicle.cable.rest_length
     left = float(TARGET[2] - runs["vehicle"].load[-1, 2])
     ledger.check(f"{name}.vehicle_height.load_too_low_m", left, stretch, 0.01, "m", "m_p g/k_a")
     ledger.judge(
-        "elasticity.rigid", "I (motivation)", "treating the cable as a rigid link lacks accuracy",
-        "worse than that: fed with the load's height, a rigid cable's controller is unstable on the cable of Table "
-        f"I at every stiffness; fed with the vehicle's height it flies above {limit:.0f} N/m, with the load {left:.2f} m "
+        "elasticity.rigid",
+        "I (motivation)",
+        "treating the cable as a rigid link lacks accuracy",
+        "worse than that: fed with the load's height, a rigid cable's controller is unstable on the cable "
+        "of Table "
+        f"I at every stiffness; fed with the vehicle's height it flies above {limit:.0f} N/m, with the "
+        f"load {left:.2f} m "
         "too low at 100 N/m",
-        REPRODUCED, "between load and thrust lies the spring: what damps the whole drives the bounce", [name],
-    )  # fmt: skip
-    return page.heading("A controller for a rigid cable, on an elastic one") + page.figure(
-        _draw(grid, growths, runs, elastic),
-        "<b>Designed for a rigid cable of l₀ = 1 m</b>, the paper's weights on the motions that it allows. Left: largest "
-        "real part of the linear loop, fed with the height, climb rate and integral of the load or of the vehicle. "
-        "Right: V.B at 100 N/m, nonlinear, offline (load z; with the load's height it tips over).",
-    ) + page.text(
-        "The rigid controller cannot tell the load's height from the vehicle's. Fed with the load's, its damping of the "
-        "whole acts on the bounce with the wrong sign, for vehicle and load then move against each other; by the same "
-        "amount however stiff the cable is, so that a stiffer cable does not help: only damping does, from "
-        f"c_a = {needed:.1f} N s/m on at 100 N/m, and from {stiff:.1f} N s/m on at 1e5 N/m. "
-        f"Fed with the vehicle's, thrust and sensor are at the same place and the bounce stays damped; below {limit:.0f} "
-        "N/m the cable is so much longer than l₀ that the pendulum is misjudged, and the load hangs too low by the "
-        f"stretch, {left:.3f} m at 100 N/m."
-    )  # fmt: skip
+        REPRODUCED,
+        "between load and thrust lies the spring: what damps the whole drives the bounce",
+        [name],
+    )
+    return (
+        page.heading("A controller for a rigid cable, on an elastic one")
+        + page.figure(
+            _draw(grid, growths, runs, elastic),
+            "<b>Designed for a rigid cable of l₀ = 1 m</b>, the paper's weights on the motions that it "
+            "allows. "
+            "Left: largest "
+            "real part of the linear loop, fed with the height, climb rate and integral of the load or of "
+            "the "
+            "vehicle. "
+            "Right: V.B at 100 N/m, nonlinear, offline (load z; with the load's height it tips over).",
+        )
+        + page.text(
+            "The rigid controller cannot tell the load's height from the vehicle's. Fed with the load's, its "
+            "damping of the "
+            "whole acts on the bounce with the wrong sign, for vehicle and load then move against each "
+            "other; "
+            "by the same "
+            "amount however stiff the cable is, so that a stiffer cable does not help: only damping does, "
+            "from "
+            f"c_a = {needed:.1f} N s/m on at 100 N/m, and from {stiff:.1f} N s/m on at 1e5 N/m. "
+            "Fed with the vehicle's, thrust and sensor are at the same place and the bounce stays damped; "
+            f"below {limit:.0f} "
+            "N/m the cable is so much longer than l₀ that the pendulum is misjudged, and the load hangs too "
+            "low by the "
+            f"stretch, {left:.3f} m at 100 N/m."
+        )
+    )
 
 
 def _draw(grid: Array, growths: dict[str, Array], runs: dict[str, second.Run], elastic: second.Run) -> bytes:

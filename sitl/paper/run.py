@@ -106,15 +106,19 @@ def _lead(ledger: Ledger) -> str:
     run = ledger.numbers["run"]
     return page.text(
         "A bachelor's assignment of July 2023, “Load transportation with an elastic cable: modeling and "
-        "control”, derives the equations of a quadrotor that carries a load on an elastic cable, and flies it with an "
+        "control”, derives the equations of a quadrotor that carries a load on an elastic cable, and flies "
+        "it with an "
         "LQR. This page runs every experiment of that paper again and says of each claim whether it "
-        f"holds: {tally}. Of {len(ledger.checks)} checked numbers {len(ledger.checks) - len(ledger.outside)} are "
+        f"holds: {tally}. Of {len(ledger.checks)} checked numbers "
+        f"{len(ledger.checks) - len(ledger.outside)} are "
         "within tolerance. "
         f"Flights ({run['flights']}) are real ones: the simulated vehicle and its controller run as two "
         "processes that meet only over MAVLink, 250 times a second of simulated time. Every number here was "
         f"computed in this {'quick ' if run['quick'] else ''}run of {run['duration_s']:.0f} s and stands in "
         "<code>paper.json</code> under the key given at the end."
     ) + page.text(
-        "<b>Colours</b>, everywhere: vehicle blue, load orange, cable green, the load's reference black and dotted; "
-        "roll, pitch and yaw, and the moments about these axes, purple, brown and pink. SI units; x east, y north, z up."
+        "<b>Colours</b>, everywhere: vehicle blue, load orange, cable green, the load's reference black "
+        "and dotted; "
+        "roll, pitch and yaw, and the moments about these axes, purple, brown and pink. SI units; x east, "
+        "y north, z up."
     )

@@ -1,7 +1,7 @@
-"""The second, independent simulation: NED and FRD, Euler angles, velocity in body axes, adaptive integrators.
+"""The second, independent simulation: NED and FRD, Euler angles, body velocity, adaptive integrators.
 
-The paper validates its equations against MATLAB's 6-DoF (Euler angles) block; this is that block with load and
-cable. It shares with the plant nothing but the vehicle description: not the frames (z points down), not the
+The paper validates its equations against MATLAB's 6-DoF (Euler angles) block; this is that block with load
+and cable. It shares with the plant nothing but the vehicle description: not the frames (z points down), not the
 attitude (Euler angles, singular at 90° of pitch), not the velocity (body axes, so that Newton's law carries
 the transport term), not the integrator, and not the law: the paper's continuous u = u* - K [x - x*; v].
 Plain floats rather than small arrays, which are several times slower here. Equation numbers: the paper's.
@@ -53,7 +53,7 @@ class Run(NamedTuple):
 
 
 class Law(NamedTuple):
-    """The paper's law, eqs. 53 to 56 as corrected: u = u* - K [x - x*; v], v = the integral of (p_p - p_ref)."""
+    """The paper's law, eqs. 53 to 56 corrected: u = u* - K [x - x*; v], v the integral of p_p - p_ref."""
 
     gain: Array
     """(4, 18), or (4, 21) with the integrator"""
@@ -179,7 +179,7 @@ def fly(vehicle: Vehicle, law: Law, times: Array) -> Run:
         return _closed_loop(vehicle, law, t, y, STILL)
 
     def lost(_: float, y: Array) -> float:
-        return min(SINGULAR_PITCH - abs(y[7]), FARTHEST - float(np.max(np.abs(y[:3]))))
+        return min(SINGULAR_PITCH - abs(float(y[7])), FARTHEST - float(np.max(np.abs(y[:3]))))
 
     lost.terminal = True  # type: ignore[attr-defined]
     solution = solve_ivp(
@@ -214,7 +214,7 @@ def fly_with_noise(vehicle: Vehicle, law: Law, force_on_load: Array, period: flo
             k4 = np.array(_closed_loop(vehicle, law, t + h, y + h * k3, force))
             y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         rows.append(y.copy())
-    return _run(np.arange(len(rows)) * period, np.array(rows), len(rows))
+    return _run(np.asarray(np.arange(len(rows)) * period, dtype=float), np.array(rows), len(rows))
 
 
 def _closed_loop(vehicle: Vehicle, law: Law, t: float, y: Array, on_load: Three) -> list[float]:
@@ -241,7 +241,7 @@ def _run(times: Array, states: Array, expected: int) -> Run:
 
 
 def jacobians(vehicle: Vehicle, x: Array, wrench: Wrench, step: float = 1e-4) -> tuple[Array, Array]:
-    """A (18, 18) and B (18, 4) in the order of eq. 31, by central differences of this formulation: its `linmod`.
+    """A (18, 18) and B (18, 4) in the order of eq. 31, by central differences: the `linmod` of this model.
 
     x: state of eq. 31 with roll, pitch and yaw at zero; step: of the differences, small beside the cable.
     """
@@ -251,7 +251,7 @@ def jacobians(vehicle: Vehicle, x: Array, wrench: Wrench, step: float = 1e-4) ->
         s = from_eq31(x)
         d = derivative(vehicle, s, (thrust, roll, pitch, yaw))
         ahead, behind = ([a + sign * 1e-5 * b for a, b in zip(s, d, strict=True)] for sign in (1.0, -1.0))
-        return (np.array(eq31(ahead)) - np.array(eq31(behind))) / 2e-5
+        return np.asarray((np.array(eq31(ahead)) - np.array(eq31(behind))) / 2e-5)
 
     u = np.array(wrench)
     a = [(rate(x + e, u.tolist()) - rate(x - e, u.tolist())) / (2 * step) for e in step * np.eye(STATE_SIZE)]
