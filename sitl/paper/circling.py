@@ -129,7 +129,7 @@ def last_periods(flight: Flight, periods: int) -> slice:
 
 
 def lag_and_ratio(flight: Flight, periods: int) -> tuple[float, float, float]:
-    """Phase lag (degrees) and radius of the load over the reference's, by the first harmonic; rms error, m."""
+    """Phase lag (degrees), radius over the reference's, both of the first harmonic, and rms error (m)."""
     rows = last_periods(flight, periods)
     turn = np.exp(-2j * math.pi * flight.time[rows] / PERIOD)
     # East and north together: the complex amplitude of a rotation at the reference's own rate.
@@ -171,6 +171,7 @@ def _draw_circle(flight: Flight) -> bytes:
     some = np.arange(rows.start, len(flight.time) - 1, round(PERIOD / 24 / (flight.time[1] - flight.time[0])))
     space: Any = figure.add_subplot(1, 2, 1, projection="3d")
     top: Any = figure.add_subplot(1, 2, 2)
+    some = some[:24]
     vehicle, load, reference = flight.vehicle[some], flight.load[some], flight.reference[some]
     for v, p in zip(vehicle, load, strict=True):
         space.plot(*np.stack([v, p]).T, color=plots.CABLE, lw=0.8)
@@ -213,6 +214,6 @@ def _draw_in_time(flights: list[Flight], others: list[second.Run]) -> bytes:
         error = np.linalg.norm(flight.load - flight.reference, axis=1)
         ax.plot(flight.time, error, color=plots.LOAD, ls=style, label=label)
     ax.set(xlabel="time [s]", ylabel="distance from reference [m]")
-    ax.legend(fontsize="small", loc="upper right")
+    ax.legend(fontsize="small", loc="center right")
     plots.shared_legend(figure, axes[0, 0])
     return plots.png(figure)

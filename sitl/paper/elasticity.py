@@ -289,7 +289,7 @@ def _others(context: Context) -> str:
 
 
 def crossed_growth(made_for: Sequence[str], flown_on: Sequence[str]) -> float:
-    """Growth rate, 1/s, of the sampled loop, a controller made for one vehicle flying another; below 0: stable."""
+    """Growth rate, 1/s, of the sampled loop with a controller made for another vehicle; below 0: stable."""
     model = with_integrator(linear_model(on(*made_for)))
     gain = sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ))
     flown = with_integrator(linear_model(on(*flown_on)))

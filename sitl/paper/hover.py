@@ -136,7 +136,7 @@ def section(context: Context) -> str:
 
 
 def accelerations(vehicle: Vehicle, length: float, thrust: float) -> tuple[float, float]:
-    """Vertical accelerations of vehicle and load, m/s², upright, the load straight below by `length` (eq. 3)."""
+    """Vertical accelerations of vehicle and load, m/s², upright, the load `length` straight below (eq. 3)."""
     pull = vehicle.cable.stiffness * (length - vehicle.cable.rest_length)
     return (
         (thrust - pull) / vehicle.airframe.mass - vehicle.gravity,

@@ -45,7 +45,7 @@ PRINTED_LENGTH = 2.0
 
 
 def printed_matrices() -> tuple[Array, Array]:
-    """A and B as Appendix F1 prints them; F2, from linmod, prints the same A, and no B that survived in the text."""
+    """A and B as Appendix F1 prints them; F2, from linmod, prints the same A (its B is not in our text)."""
     a, b = np.zeros((18, 18)), np.zeros((18, 4))
     for i in range(6):
         a[i, 6 + i] = 1.0
@@ -372,7 +372,7 @@ def _draw_poles(open_loop: Any, closed: dict[str, Any]) -> bytes:
         ax.plot(poles.real, poles.imag, marker, color=colour, mfc="none", label=label)
     ax.set(xlim=(-4, 0.5), xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
     ax.axvline(0.0, color=plots.LIMIT, lw=0.8)
-    ax.legend(fontsize="small", loc="upper left")
+    ax.legend(fontsize="small", loc="center left")
     return plots.png(figure)
 
 

@@ -1,4 +1,4 @@
-"""Section V.A, figs. 8 and 9: the LQR at hover, without and with noise on the load; its steady-state error."""
+"""Section V.A, figs. 8 and 9: the LQR at hover, without and with noise; its steady-state error."""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ def held_forces(flight: Flight) -> Array:
 
 
 def stationary_std(vehicle: Vehicle) -> Array:
-    """Standard deviations (18,) of the state for a held white force of 1 N on the load, closed by the paper's LQR."""
+    """Standard deviations (18,) of the state under the LQR, for a held white force of 1 N on the load."""
     gain, model = gains(vehicle, integral=False)
     closed = model.A - model.B @ gain
     force = np.zeros((18, 3))

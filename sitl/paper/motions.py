@@ -30,7 +30,7 @@ FROM_REST_LENGTH = ("initial.vehicle_position=[0, 0, 1]",)
 
 
 class Case(NamedTuple):
-    """One motion: what differs from Table I at equilibrium, the thrust over hover's, the signs of the moments."""
+    """One motion: what differs from Table I at equilibrium, thrust over hover thrust, signs of the moments."""
 
     title: str
     overrides: tuple[str, ...]
@@ -152,7 +152,9 @@ def _fall_numbers(context: Context, name: str, ours: offline.Motion) -> str:
     centre = 0.5 * (ours.states[:, 2] + ours.states[:, 5])
     fall = float(-2.0 * (centre[-1] - centre[0]) / ours.time[-1] ** 2)
     context.ledger.check(f"{name}.centre_acceleration_m_s2", fall, 9.81, 1e-6, "m/s²", "g")
-    return f"The common centre of mass falls with {fall:.3f} m/s²; the cable, stretched at first, oscillates in between."
+    return (
+        f"The common centre falls with {fall:.3f} m/s²; the cable, stretched at first, oscillates meanwhile."
+    )
 
 
 def _bounce_numbers(context: Context, name: str, vehicle: Vehicle, ours: offline.Motion) -> str:

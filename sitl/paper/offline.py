@@ -75,7 +75,7 @@ def cable_tension(vehicle: Vehicle, states: Array) -> Array:
 
 
 def open_loop(vehicle: Vehicle, wrench: tuple[float, float, float, float], times: Array) -> Motion:
-    """Hold the rotors at the speeds that give a wrench (N, N m), from the initial state; times: equidistant, s."""
+    """Hold the rotors at the speeds that give a wrench (N, N m); times: equidistant, s."""
     rate_hz = 1.0 / float(times[1] - times[0])
     world = World(vehicle, rate_hz, seed=0)
     record = allocation(vehicle)[0]
@@ -99,7 +99,7 @@ def closed_loop(
     rate_hz: float = RATE_HZ,
     delay_ticks: int = 0,
 ) -> Motion:
-    """Fly a design along a path; the plant applies each command `delay_ticks` later. The estimate is the truth."""
+    """Fly a design along a path on the truth; the plant applies each command `delay_ticks` later."""
     world = World(vehicle, rate_hz, seed=0)
     estimate, controls = np.zeros(STATE_SIZE), np.zeros(MOST_ROTORS)
     estimate[:] = eq31(world.state)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import html
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -11,7 +12,8 @@ from sitl.paper.record import CORRECTED, REPRODUCED, UNSUPPORTED, Ledger
 
 STYLE = """
 :root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #1c1c1c; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1c1c1c;
+  max-width: 62rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { line-height: 1.2; } h2 { margin-top: 3rem; border-bottom: 1px solid #ccc; } h3 { margin-top: 2rem; }
 figure { margin: 1.5rem 0; } figure img { width: 100%; height: auto; } figcaption { color: #333; }
 table { border-collapse: collapse; margin: 1rem 0; font-size: 0.9rem; } .wide { overflow-x: auto; }
@@ -41,7 +43,8 @@ def figure(png: bytes, caption: str, commands: Sequence[str] = ()) -> str:
     """A picture with its caption, and the commands that fly it again."""
     data = base64.b64encode(png).decode("ascii")
     again = "".join(f"<br><code>{html.escape(command)}</code>" for command in commands)
-    alt = html.escape(caption.split(".")[0], quote=True)
+    title = re.sub("<[^>]*>", "", caption)
+    alt = html.escape(title.split(". ")[0], quote=True)
     return (
         f'<figure><img alt="{alt}" src="data:image/png;base64,{data}">'
         f"<figcaption>{caption}{again}</figcaption></figure>"

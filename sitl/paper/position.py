@@ -248,6 +248,6 @@ def _draw_setpoint(flights: list[Flight], others: list[second.Run]) -> bytes:
         lengths = [np.linalg.norm(run.vehicle - run.load, axis=1) for run in (flight, other)]
         plots.pair(ax, plots.CABLE, "cable length", (flight.time, lengths[0]), (other.time, lengths[1]))
         ax.set(xlabel="time [s]", ylabel="cable length [m]")
-        axes[0, column].set_title(f"l₀ = {LENGTHS[index]} m", fontsize="medium")
+        axes[0, column].set(title=f"l₀ = {LENGTHS[index]} m", xlim=(0, 15))
     plots.shared_legend(figure, axes[0, 0], columns=5)
     return plots.png(figure)

@@ -1,4 +1,4 @@
-"""What a run finds: numbers under dotted keys, checks against expectations, verdicts on the paper's claims."""
+"""What a run finds: numbers under dotted keys, checks of them, verdicts on the paper's claims."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Ledger:
     def check(
         self, key: str, value: float, expected: float, tolerance: float, unit: str = "", source: str = ""
     ) -> float:
-        """Record a number that should be within `tolerance` of `expected`; returns it. source: of the expectation."""
+        """Record a number that should be within `tolerance` of `expected`; source: where that is from."""
         within = math.isfinite(value) and abs(value - expected) <= tolerance
         return float(self._check(key, value, expected, f"± {tolerance:.3g}", tolerance, within, unit, source))
 
@@ -93,7 +93,7 @@ class Ledger:
     def judge(
         self, key: str, where: str, paper: str, ours: str, verdict: str, why: str, rests_on: Sequence[str]
     ) -> None:
-        """A verdict on a claim. It stands as long as the checks it rests on (keys, or prefixes of keys) hold."""
+        """A verdict on a claim; it stands while the checks that it rests on (keys or prefixes) hold."""
         found = [name for name in self.checks if any(name == k or name.startswith(f"{k}.") for k in rests_on)]
         unknown = [k for k in rests_on if not any(n == k or n.startswith(f"{k}.") for n in self.checks)]
         if unknown:

@@ -31,7 +31,8 @@ Z_VEHICLE, Z_LOAD, CLIMB_VEHICLE, CLIMB_LOAD, INTEGRAL_Z = 2, 5, 8, 11, 20
 def rigid_motions() -> Array:
     """The motions (21, 19) that a rigid cable allows: vehicle and load share height and climb rate.
 
-    Deviations in the order of eq. 31 and the integral, from the same without the load's height and climb rate.
+    Deviations in the order of eq. 31 and the integral, from the same without
+    the load's height and climb rate.
     """
     columns = np.eye(21)
     columns[Z_LOAD, Z_VEHICLE] = columns[CLIMB_LOAD, CLIMB_VEHICLE] = 1.0

@@ -1,7 +1,7 @@
 """The second, independent simulation: NED and FRD, Euler angles, body velocity, adaptive integrators.
 
 The paper validates its equations against MATLAB's 6-DoF (Euler angles) block; this is that block with load
-and cable. It shares with the plant nothing but the vehicle description: not the frames (z points down), not the
+and cable. It shares with the plant nothing but the vehicle description: not the frames (z is down), not the
 attitude (Euler angles, singular at 90° of pitch), not the velocity (body axes, so that Newton's law carries
 the transport term), not the integrator, and not the law: the paper's continuous u = u* - K [x - x*; v].
 Plain floats rather than small arrays, which are several times slower here. Equation numbers: the paper's.
@@ -137,7 +137,7 @@ def initial_state(vehicle: Vehicle) -> list[float]:
     lx, ly, lz = start.load_position
     lvx, lvy, lvz = start.load_velocity
     return [
-        *(y, x, -z), 0.0, 0.0, 0.0, roll, -pitch, math.pi / 2 - yaw, p, -q, -r, *(ly, lx, -lz), *(lvy, lvx, -lvz)
+        y, x, -z, 0.0, 0.0, 0.0, roll, -pitch, math.pi / 2 - yaw, p, -q, -r, ly, lx, -lz, lvy, lvx, -lvz
     ]  # fmt: skip
 
 
