@@ -29,6 +29,8 @@ STENCIL = np.dtype(
         ("load", "f8", (POINTS, 3)),  # m
         ("vehicle", "f8", (POINTS, 3)),  # m
         ("pull", "f8", (POINTS, 3)),  # N, of the cable on the load
+        ("force", "f8", (POINTS, 3)),  # N, that the rotors have to give
+        ("thrust", "f8", POINTS),  # N
         ("tilt", "f8", (POINTS, 2)),  # roll and pitch, rad
     ]
 )
@@ -80,33 +82,33 @@ def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
 
 
 @kernel
-def flat_motion(b: Any, path: Any, t: float, stencil: Any, state: Array, wrench: Array) -> None:
-    """x* (18,), eq. 31, and u* (4,) at time t (s) for a feasible path, yaw at zero."""
+def flat_motion(b: Any, path: Any, t: float, lead: float, stencil: Any, state: Array, wrench: Array) -> None:
+    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path, yaw at zero."""
     h = STENCIL_STEP
-    for j in range(POINTS):
-        feasible(path, t + (j - 2) * h, stencil.derivatives, stencil.smooth_step)
+    at_rest = path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h
+    first, last = (POINTS // 2, POINTS // 2 + 1) if at_rest else (0, POINTS)
+    for j in range(first, last):
+        feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
         _hang(b, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
-    thrust = 0.0
-    for j in range(1, 4):
-        force_x, force_y, force_z = 0.0, 0.0, 0.0
-        for i in range(3):
-            before, here, after = stencil.vehicle[j - 1, i], stencil.vehicle[j, i], stencil.vehicle[j + 1, i]
-            acceleration = (before - 2.0 * here + after) / (h * h)
-            force = b.vehicle_mass * acceleration + stencil.pull[j, i]
-            if i == 0:
-                force_x = force
-            elif i == 1:
-                force_y = force
-            else:
-                force_z = force + b.vehicle_mass * b.gravity
-        size = math.sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
-        stencil.tilt[j, 0] = -math.asin(force_y / size)
-        stencil.tilt[j, 1] = math.atan2(force_x, force_z)
-        if j == 2:
-            thrust = size
+    for i in range(18):
+        state[i] = 0.0
     for i in range(3):
         state[i] = stencil.vehicle[2, i]
         state[3 + i] = stencil.load[2, i]
+    wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
+    if at_rest:
+        return
+    for j in range(1, 4):
+        for i in range(3):
+            before, here, after = stencil.vehicle[j - 1, i], stencil.vehicle[j, i], stencil.vehicle[j + 1, i]
+            acceleration = (before - 2.0 * here + after) / (h * h)
+            stencil.force[j, i] = b.vehicle_mass * acceleration + stencil.pull[j, i]
+        stencil.force[j, 2] += b.vehicle_mass * b.gravity
+        x, y, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
+        stencil.thrust[j] = math.sqrt(x * x + y * y + z * z)
+        stencil.tilt[j, 0] = -math.asin(y / stencil.thrust[j])
+        stencil.tilt[j, 1] = math.atan2(x, z)
+    for i in range(3):
         state[6 + i] = (stencil.vehicle[3, i] - stencil.vehicle[1, i]) / (2.0 * h)
         state[9 + i] = (stencil.load[3, i] - stencil.load[1, i]) / (2.0 * h)
     roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
@@ -116,5 +118,5 @@ def flat_motion(b: Any, path: Any, t: float, stencil: Any, state: Array, wrench:
     state[12] = roll_rate
     state[13] = math.cos(roll) * pitch_rate
     state[14] = -math.sin(roll) * pitch_rate
-    state[15], state[16], state[17] = roll, pitch, 0.0
-    wrench[0], wrench[1], wrench[2], wrench[3] = thrust, 0.0, 0.0, 0.0
+    state[15], state[16] = roll, pitch
+    wrench[0] = stencil.thrust[2] + lead * (stencil.thrust[3] - stencil.thrust[1]) / (2.0 * h)

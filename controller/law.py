@@ -25,7 +25,7 @@ LONGEST_DELAY = 64
 """Most ticks of loop delay that a design can predict over."""
 
 INTEGRATOR, FEEDFORWARD, STATE = 0, 1, 2
-"""How the reference enters: through the integrator alone, as a feasible motion, or as x* itself (no integrator)."""
+"""How the reference enters: through the integrator alone, as a feasible motion, or as x* itself."""
 
 DESIGN = np.dtype(
     [
@@ -61,7 +61,6 @@ WORK = np.dtype(
         ("reference", "f8", 3),  # p_ref, m
         ("deviation", "f8", STATE_SIZE),  # x - x*
         ("desired", "f8", STATE_SIZE),  # x*
-        ("ahead", "f8", STATE_SIZE),  # x* when this step's command acts
         ("feedforward", "f8", WRENCH_SIZE),  # u*
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
@@ -88,8 +87,7 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
     """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s)."""
     if design.entry == FEEDFORWARD:
         # What is commanded now acts after the delay and the rotors' lag, held for a period.
-        flat_motion(design.body, path, t + design.lead_time, work.stencil, work.ahead, work.feedforward)
-        flat_motion(design.body, path, t, work.stencil, work.desired, work.achieved)
+        flat_motion(design.body, path, t, design.lead_time, work.stencil, work.desired, work.feedforward)
         for axis in range(3):
             work.reference[axis] = work.desired[3 + axis]
     else:

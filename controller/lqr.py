@@ -7,6 +7,7 @@ continuous quadratic cost exactly for that loop: zero-order hold with the cost i
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -59,7 +60,7 @@ def sampled_model(model: LinearModel, weights: Weights, period: float) -> Sample
     dynamics = np.zeros((size, size))
     dynamics[:n, :n], dynamics[:n, n:] = model.A, model.B
     # exp(-F' h) grows as fast as the model's fastest decay; short pieces, doubled, keep every digit.
-    pieces = max(0, int(np.ceil(np.log2(max(1e-12, np.linalg.norm(dynamics, 2) * period)))))
+    pieces = max(0, math.ceil(math.log2(max(1e-12, float(np.linalg.norm(dynamics, 2)) * period))))
     step = period / 2**pieces
     block = np.zeros((2 * size, 2 * size))
     block[:size, :size] = -dynamics.T

@@ -78,7 +78,7 @@ def build_parser() -> argparse.ArgumentParser:
         "fly",
         help="launch plant and controller, fly a scenario, report on it",
         description="Launch plant and controller as two processes, fly a scenario and report on it. "
-        "Exit code 0 when the load settled, 1 when it did not or a process failed, 2 for a wrong command line.",
+        "Exit code 0: the load settled; 1: it did not, or a process failed; 2: the command line is wrong.",
     )
     fly.add_argument("scenario", metavar="SCENARIO", help="a scenario's name (see below) or .toml file")
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."

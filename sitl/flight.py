@@ -103,6 +103,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         "completed": bool(outcome.end.get("completed")) and not outcome.failure,
         "failure": outcome.failure,
         "launch_to_first_command_s": outcome.launch_to_first_command_s,
+        "first_command_unix_s": outcome.first_command_unix_s,
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
     path = scenario.reference.path(start)

@@ -28,6 +28,7 @@ class Outcome:
     """The plant's own account."""
     failure: str | None = None
     """What went wrong, in one line."""
+    first_command_unix_s: float | None = None
     launch_to_first_command_s: float | None = None
 
 
@@ -143,6 +144,7 @@ def _events(stream: IO[bytes], buffer: bytes, outcome: Outcome, pair: Pair, show
         event = json.loads(line)
         kind = event.pop("event")
         if kind == "begin":
+            outcome.first_command_unix_s = event["unix_time_s"]
             outcome.launch_to_first_command_s = event["unix_time_s"] - pair.launched_at
         elif kind == "progress":
             show(event)

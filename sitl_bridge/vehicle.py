@@ -27,9 +27,9 @@ def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> 
 
 
 class Section(BaseModel):
-    """A table of the description: unknown keys and values that are not finite are faults."""
+    """A table of the description: unknown keys, other types and values that are not finite are faults."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class Airframe(Section):
@@ -104,7 +104,7 @@ class Vehicle(Section):
     gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
     airframe: Airframe
     rotors: tuple[Rotor, ...] = quantity(
-        "rotors", "in the order of the actuator controls", min_length=4, max_length=16
+        "-", "in the order of the actuator controls", min_length=4, max_length=16
     )
     cable: Cable
     load: Load
@@ -177,10 +177,10 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
         raise DescriptionError(
             name_or_file, [f"no such {kind}; expected one of {known}, or the path of a .toml file"]
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
     except tomllib.TOMLDecodeError as error:
         raise DescriptionError(name_or_file, [f"not valid TOML: {error}"]) from None
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or no possible path
+        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
 
 
 def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
@@ -201,14 +201,16 @@ def apply_override(content: dict[str, Any], override: str) -> None:
     if not equals or not all(path):
         raise DescriptionError("--set", [f"{override!r}: expected KEY=VALUE, as in cable.rest_length=10"])
     try:
-        value: Any = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
+        parsed = tomllib.loads(f"value = {text.strip()}")
+    except ValueError:
+        parsed = {}
+    # A bare word is no TOML; more than one value (on lines of their own) is no value either.
+    value: Any = parsed["value"] if parsed.keys() == {"value"} else text.strip()
     target: Any = content
     for step, following in zip(path, [*path[1:], None], strict=True):
         place: Any = step
         if isinstance(target, list):
-            if not step.isdigit() or int(step) >= len(target):
+            if not step.isdecimal() or int(step) >= len(target):
                 raise DescriptionError("--set", [f"{key}: {step!r} is no index of a list of {len(target)}"])
             place = int(step)
         elif not isinstance(target, dict):
@@ -222,7 +224,7 @@ def apply_override(content: dict[str, Any], override: str) -> None:
 def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
     """Validate a parsed file against its model; raises DescriptionError with a line for each fault."""
     try:
-        return model.model_validate(content)
+        return model.model_validate(_tuples(content))
     except ValidationError as error:
         faults = error.errors()
         # A list that seems short only because one of its entries is at fault is no fault of its own.
@@ -231,20 +233,43 @@ def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Mo
         raise DescriptionError(source, [_fault_line(model, fault) for fault in own]) from None
 
 
+def _tuples(value: Any) -> Any:
+    """TOML's lists as the tuples that the models are made of."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(entry) for key, entry in value.items()}
+    return tuple(_tuples(entry) for entry in value) if isinstance(value, list) else value
+
+
+# Where pydantic's words are those of Python and not of TOML.
+_PROBLEMS = {
+    "tuple_type": "not a list",
+    "model_type": "not a table",
+    "too_short": "too few",
+    "too_long": "too many",
+}
+
+
+def _shown(value: Any) -> str:
+    """A faulty value as it goes into a message, cut to a readable length."""
+    text = repr(list(value) if isinstance(value, tuple) else value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def _fault_line(model: type[BaseModel], fault: Any) -> str:
     """One line for one fault: key, value, unit, allowed range."""
     where = ".".join(str(part) for part in fault["loc"])
     field = _field_at(model, fault["loc"])
     unit = _unit(field)
-    problem = fault["msg"].removeprefix("Value error, ")
+    problem = _PROBLEMS.get(fault["type"], fault["msg"].removeprefix("Value error, "))
     if fault["type"] == "missing":
         return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
     if fault["type"] == "extra_forbidden":
-        return f"{where} = {fault['input']!r}: no such key"
+        return f"{where} = {_shown(fault['input'])}: no such key"
     if fault["type"] == "value_error":
         return f"{where}: {problem}" if where else problem
-    allowed = _expectation(field)
-    value = f"{where} = {fault['input']!r}{f' {unit}' if unit else ''}"
+    of_list = isinstance(fault["loc"][-1], int)
+    allowed = _expectation(field, entry=of_list)
+    value = f"{where} = {_shown(fault['input'])}{f' {unit}' if unit else ''}"
     return f"{value}: {problem[0].lower()}{problem[1:]}{f'; allowed: {allowed}' if allowed else ''}"
 
 
@@ -268,10 +293,12 @@ def _unit(field: FieldInfo | None) -> str:
     return "" if unit in ("-", "") else str(unit)
 
 
-def _expectation(field: FieldInfo | None) -> str:
-    """The allowed range of a field in words, from its own declaration."""
+def _expectation(field: FieldInfo | None, entry: bool = False) -> str:
+    """The allowed range of a field, or of one entry of it, in words, from its own declaration."""
     if field is None:
         return ""
+    if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+        return "a table"
     options = getattr(field.annotation, "__args__", ())
     if options and all(isinstance(option, str) for option in options):
         return " or ".join(options)
@@ -280,6 +307,11 @@ def _expectation(field: FieldInfo | None) -> str:
         metadata += [
             m for info in getattr(argument, "__metadata__", ()) for m in getattr(info, "metadata", [])
         ]
+    lengths = [
+        getattr(m, name) for m in metadata for name in ("min_length", "max_length") if hasattr(m, name)
+    ]
+    if len(lengths) == 2:
+        return "a table" if entry else "{} to {} tables".format(*lengths)
     words: dict[str, None] = {}
     for mark in metadata:
         for kind, name, sign in (
@@ -290,8 +322,10 @@ def _expectation(field: FieldInfo | None) -> str:
         ):
             if isinstance(mark, kind):
                 words[f"{sign} {getattr(mark, name):g}"] = None
-    if not words and field.annotation in (float, Vector):
-        return "a finite number" if field.annotation is float else "three finite numbers"
+    if not words and Vector in (field.annotation, *options):
+        return "a finite number" if entry else "three finite numbers"
+    if field.annotation is str:
+        return "text"
     return " and ".join(words)
 
 

@@ -56,7 +56,7 @@ class AnswerWriter:
         self._packer = packer
         record, payload = HIL_ACTUATOR_CONTROLS.record()
         out = np.zeros(ANSWER_SIZE, dtype=np.uint8)
-        self._view = memoryview(out)
+        self._view = out.data
         self._write = write_answer.bind(record, payload, self.controls, out)
 
     def answer(self, time_usec: int, armed: bool) -> bytes:

@@ -121,7 +121,7 @@ class TickReader:
         data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
         self._header = np.zeros(2, dtype=np.int64)
-        self._view = memoryview(data)
+        self._view = data.data
         records = np.zeros(1, dtype=INCOMING)
         payloads = records.view(np.uint8)
         self._read = read_tick.bind(data, self._table, records, payloads, self.estimate, self._header)

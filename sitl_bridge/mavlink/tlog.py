@@ -45,7 +45,7 @@ class TlogWriter:
         self._file: BinaryIO = path.open("wb", buffering=1 << 16)
         self._data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._out = np.zeros(_OUT_SIZE, dtype=np.uint8)
-        self._data_view, self._out_view = memoryview(self._data), memoryview(self._out)
+        self._data_view, self._out_view = self._data.data, self._out.data
         table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
         self._stamp = stamp_frames.bind(self._data, table, self._out)
 

@@ -112,7 +112,7 @@ class AnswerReader:
         record, payload = HIL_ACTUATOR_CONTROLS.record()
         self._controls = np.zeros(CONTROLS)
         self._header = np.zeros(3, dtype=np.int64)
-        self._view = memoryview(self._data)
+        self._view = self._data.data
         self._read = read_answer.bind(self._data, self._table, record, payload, self._controls, self._header)
 
     def read(self, datagram: bytes) -> Received:

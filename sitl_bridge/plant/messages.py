@@ -158,13 +158,13 @@ class TickWriter:
         for body in ("vehicle", "load"):  # the first element NaN: covariance unknown
             record[body]["pose_covariance"][0] = record[body]["velocity_covariance"][0] = math.nan
         self._out = np.zeros(DATAGRAM_SIZE, dtype=np.uint8)
-        self._view = memoryview(self._out)
+        self._view = self._out.data
         counters = np.array([0, 0, vehicle_system(instance), load_system(instance)], dtype=np.int64)
         payloads = self._records.view(np.uint8)
         self._write = write_tick.bind(self._records, payloads, measurement, state, counters, self._out)
 
     def datagram(self, time_usec: int, gps: GpsFix | None, truth: bool) -> bytes:
-        """All frames of a tick: HIL_GPS when there is a new fix, ODOMETRY of both when asked for, HIL_SENSOR."""
+        """All frames of a tick: HIL_GPS when there is a fix, ODOMETRY of both when asked for, HIL_SENSOR."""
         if gps is not None:
             self._fill_gps(time_usec, gps)
         length = self._write(time_usec, gps is not None, truth)

@@ -97,6 +97,10 @@ class Simulation:
         """
         self._heard = True
 
+    def ask_for_truth(self, wanted: bool) -> None:
+        """Send ODOMETRY of vehicle and load with every tick, or no more."""
+        self._truth = wanted
+
     def begin(self) -> None:
         """The scenario begins at the current tick: initial state, fresh random streams."""
         self.world.reset()
@@ -146,7 +150,7 @@ class Simulation:
         asked = int(command.param1) if command.param1 == command.param1 else -1
         if command.command != common.MAV_CMD_SET_MESSAGE_INTERVAL or asked != ODOMETRY.message_id:
             return None
-        self._truth = command.param2 >= 0
+        self.ask_for_truth(command.param2 >= 0)
         acknowledgement: Any = common.MAVLink_command_ack_message(
             command=command.command,
             result=common.MAV_RESULT_ACCEPTED,
