@@ -19,6 +19,8 @@ ANGLES = (0.3, -0.4, 0.5)
 RATES = np.array([0.7, -0.2, 0.4])
 """p, q, r, rad/s, likewise."""
 
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
 EQUATIONS = (
     (
         "2",
@@ -61,7 +63,7 @@ def section(context: Context) -> str:
     """The section's content."""
     ledger = context.ledger
     printed, corrected = rotation(ANGLES, as_printed=True), rotation(ANGLES)
-    ours = np.array([rotate(quaternion_from_euler(ANGLES), tuple(axis)) for axis in np.eye(3).tolist()]).T
+    ours = np.array([rotate(quaternion_from_euler(ANGLES), axis) for axis in AXES]).T
     ledger.at_least(
         "model.eq2.printed_orthogonality_error", _skewness(printed), 0.01, source="errata.md, eq. 2"
     )

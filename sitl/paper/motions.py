@@ -30,7 +30,7 @@ FROM_REST_LENGTH = ("initial.vehicle_position=[0, 0, 1]",)
 
 
 class Case(NamedTuple):
-    """One motion: what differs from Table I at equilibrium, thrust over hover thrust, signs of the moments."""
+    """One motion: what differs from Table I in equilibrium, thrust over hover's, signs of the moments."""
 
     title: str
     overrides: tuple[str, ...]

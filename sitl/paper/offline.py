@@ -54,13 +54,14 @@ class Motion(NamedTuple):
 
 def eq31(state: Array) -> list[float]:
     """State (18,) in the order of eq. 31 of the plant's state."""
+    w, x, y, z = state[plant.ATTITUDE].tolist()
     return [
         *state[plant.VEHICLE_POSITION],
         *state[plant.LOAD_POSITION],
         *state[plant.VEHICLE_VELOCITY],
         *state[plant.LOAD_VELOCITY],
         *state[plant.BODY_RATES],
-        *euler_from_quaternion(state[plant.ATTITUDE]),
+        *euler_from_quaternion((w, x, y, z)),
     ]
 
 
