@@ -30,16 +30,24 @@ LAGS = {"1": 75.0, "10": 109.0}
 """errata.md, degrees"""
 
 
+def turns(quick: bool) -> int:
+    """How many turns, after everything has settled, are judged."""
+    return 2 if quick else 5
+
+
+def requests(quick: bool) -> list[Request]:
+    """The paper's design on each cable, and our default design on the long one."""
+    duration = math.ceil(STEADY_FROM + turns(quick) * PERIOD)
+    paper = [Request("circle", "paper", duration, (f"cable.rest_length={length}",)) for length in LENGTHS]
+    return [*paper, Request("circle", "default", duration, ("cable.rest_length=10",))]
+
+
 def section(context: Context) -> str:
     """The section's content."""
     ledger = context.ledger
-    periods = 2 if context.quick else 5
-    duration = math.ceil(STEADY_FROM + periods * PERIOD)
+    periods = turns(context.quick)
     context.say("figure 11: the circle on 10 m and on 1 m of cable")
-    flights = context.pilot.fly(
-        [Request("circle", "paper", duration, (f"cable.rest_length={length}",)) for length in LENGTHS]
-        + [Request("circle", "default", duration, ("cable.rest_length=10",))]
-    )
+    flights = context.pilot.fly(requests(context.quick))
     others: list[second.Run] = []
     rows: list[tuple[Any, ...]] = []
     for length, flight in zip(LENGTHS, flights, strict=False):

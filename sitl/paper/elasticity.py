@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.designs import design, paper_weights
-from controller.lqr import SampledGain, sampled_gain, sampled_model
+from controller.lqr import sampled_gain, sampled_model
 from controller.model import linear_model, with_integrator
 from controller.reference import setpoint
 from sitl.metrics import overshoot_pct, settling_time
@@ -77,6 +77,11 @@ class Response(NamedTuple):
         }
 
 
+def requests(quick: bool) -> list[Request]:
+    """The points of the sweep over the stiffness that fly over the link too."""
+    return [Request("setpoint", "paper", DURATION, (f"cable.stiffness={k!r}",)) for k in FLOWN]
+
+
 def section(context: Context) -> str:
     """The section's content."""
     return _stiffness(context) + _others(context) + _crossed(context)
@@ -125,9 +130,8 @@ def _stiffness(context: Context) -> str:
     responses = {k: respond(on(f"cable.stiffness={k!r}")) for k in stiffnesses}
     ledger.put("elasticity", [{"stiffness_N_m": k, **r.row()} for k, r in responses.items()])
     context.say("elasticity: three stiffnesses over the link")
-    requests = [Request("setpoint", "paper", DURATION, (f"cable.stiffness={k!r}",)) for k in FLOWN]
     flown_rows = []
-    for k, flight in zip(FLOWN, context.pilot.fly(requests), strict=True):
+    for k, flight in zip(FLOWN, context.pilot.fly(requests(context.quick)), strict=True):
         error = np.linalg.norm(flight.load - np.array(TARGET), axis=1)
         settled = settling_time(flight.time, error, 0.02 * float(error[0])) or math.inf
         key, r = f"elasticity_flown.{k:.0f}_N_m", responses[k]
@@ -206,7 +210,7 @@ def _stiffness(context: Context) -> str:
         + page.figure(
             _draw_stiffness(table, flown_rows),
             "<b>Over the stiffness k_a.</b> Dots: the sweep; rings: flown over the link.",
-            [request.command for request in requests],
+            [request.command for request in requests(context.quick)],
         )
         + page.table(
             (
@@ -288,12 +292,12 @@ def _others(context: Context) -> str:
     return "".join(blocks)
 
 
-def crossed_growth(made_for: Sequence[str], flown_on: Sequence[str]) -> float:
-    """Growth rate, 1/s, of the sampled loop with a controller made for another vehicle; below 0: stable."""
-    model = with_integrator(linear_model(on(*made_for)))
-    gain = sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ))
-    flown = with_integrator(linear_model(on(*flown_on)))
-    return math.log(spectral_radius(flown, SampledGain(gain.state, gain.past), 1.0 / RATE_HZ, 0)) * RATE_HZ
+def crossed_growths(vehicles: Sequence[Vehicle]) -> Array:
+    """Growth rates (designed for, flown on), 1/s, of the sampled loops; below 0: stable."""
+    models = [with_integrator(linear_model(vehicle)) for vehicle in vehicles]
+    made = [sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ)) for model in models]
+    radii = [[spectral_radius(model, gain, 1.0 / RATE_HZ, 0) for model in models] for gain in made]
+    return np.asarray(np.log(np.array(radii)) * RATE_HZ)
 
 
 def _crossed(context: Context) -> str:
@@ -305,9 +309,7 @@ def _crossed(context: Context) -> str:
         ("cable.stiffness", "k_a [N/m]", (20.0, 50.0, 100.0, 300.0, 1e3, 1e4, 1e5)),
         ("cable.rest_length", "l₀ [m]", (0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0)),
     ):
-        growths = np.array(
-            [[crossed_growth([f"{key}={d!r}"], [f"{key}={f!r}"]) for f in values] for d in values]
-        )
+        growths = crossed_growths([on(f"{key}={value!r}") for value in values])
         name = f"elasticity_crossed.{key.replace('.', '_')}"
         ledger.put(f"{name}.values", values)
         ledger.put(f"{name}.growth_1_s", growths)

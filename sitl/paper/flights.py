@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -58,8 +58,8 @@ class Request(NamedTuple):
     scenario: str
     design: str
     duration: float
-    overrides: Sequence[str] = ()
-    plant_overrides: Sequence[str] = ()
+    overrides: tuple[str, ...] = ()
+    plant_overrides: tuple[str, ...] = ()
     seed: int = 0
 
     @property
@@ -77,24 +77,42 @@ AT_ONCE = 2
 
 
 class Pilot:
-    """Makes flights, each on a free port and into a folder of its own."""
+    """Makes flights in the background, each on a free port and into a folder of its own.
+
+    What is asked for early is ready when it is needed: the flights take as long as everything else together.
+    """
 
     def __init__(self, folder: Path, stop: StopRequest) -> None:
         self._folder = folder
         self._stop = stop
         self._ports: set[int] = set()
-        self.flown = 0
+        self._pool = ThreadPoolExecutor(AT_ONCE)
+        self._asked: dict[Request, Future[Flight]] = {}
+
+    @property
+    def flown(self) -> int:
+        """How many flights were asked for."""
+        return len(self._asked)
+
+    def ask(self, requests: Sequence[Request]) -> None:
+        """Make these flights when their turn comes; nobody waits for them yet."""
+        for request in requests:
+            if request not in self._asked:
+                out, port = self._folder / f"flight-{len(self._asked) + 1:02d}", self._free_port()
+                self._asked[request] = self._pool.submit(self._fly, request, out, port)
 
     def fly(self, requests: Sequence[Request]) -> list[Flight]:
-        """Make these flights; raises FlightError when one does not come to its end."""
-        jobs = []
-        for request in requests:
-            self.flown += 1
-            jobs.append((request, self._folder / f"flight-{self.flown:02d}", self._free_port()))
-        with ThreadPoolExecutor(AT_ONCE) as pool:
-            return list(pool.map(lambda job: self._fly(*job), jobs))
+        """These flights, made; raises FlightError when one did not come to its end."""
+        self.ask(requests)
+        return [self._asked[request].result() for request in requests]
+
+    def close(self) -> None:
+        """Give up what has not begun, and wait for what has."""
+        self._pool.shutdown(cancel_futures=True)
 
     def _fly(self, request: Request, out: Path, port: int) -> Flight:
+        if self._stop:
+            raise FlightError(f"stopped by {self._stop.reason}")
         description = load_scenario(request.scenario)
         out.mkdir(parents=True)
         options = FlightOptions(

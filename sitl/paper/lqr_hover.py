@@ -52,6 +52,26 @@ STARTS = {
 }
 
 
+NOISE = (f"disturbance.force_std={FORCE_STD:g}", "disturbance.acts_on=load")
+HEAVY = ("load.mass=11",)
+"""Of the plant alone: heavier than the controller knows."""
+
+
+def noisy_starts(quick: bool) -> dict[str, Start]:
+    """The starts that fly under noise."""
+    return {key: start for key, start in STARTS.items() if key in ("equilibrium", "printed") or not quick}
+
+
+def requests(quick: bool) -> tuple[list[Request], list[Request], list[Request]]:
+    """Flights of figure 8, of figure 9, and with the heavier load: LQR, then integral LQR."""
+    calm, noisy = (15.0, 20.0) if quick else (30.0, 30.0)
+    return (
+        [Request("hover", "paper-lqr", calm, start.overrides) for start in STARTS.values()],
+        [Request("hover", "paper-lqr", noisy, (*s.overrides, *NOISE)) for s in noisy_starts(quick).values()],
+        [Request("hover", "paper-lqr", 45.0, (), HEAVY), Request("hover", "paper", 20.0, (), HEAVY)],
+    )
+
+
 def section(context: Context) -> str:
     """The section's content."""
     return _figure_8(context) + _figure_9(context) + _steady_state(context)
@@ -67,11 +87,9 @@ def law(vehicle: Vehicle, start: Vehicle | None = None) -> second.Law:
 
 
 def _figure_8(context: Context) -> str:
-    ledger, duration = context.ledger, 15.0 if context.quick else 30.0
+    ledger = context.ledger
     context.say("figure 8: LQR at hover from four initial conditions")
-    flights = context.pilot.fly(
-        [Request("hover", "paper-lqr", duration, start.overrides) for start in STARTS.values()]
-    )
+    flights = context.pilot.fly(requests(context.quick)[0])
     others, rows = [], []
     for (key, start), flight in zip(STARTS.items(), flights, strict=True):
         other = second.fly(flight.vehicle_description, law(flight.vehicle_description), flight.time)
@@ -170,13 +188,10 @@ def largest_difference(flight: Flight, other: second.Run) -> float:
 
 
 def _figure_9(context: Context) -> str:
-    ledger, duration = context.ledger, 20.0 if context.quick else 30.0
+    ledger = context.ledger
     context.say(f"figure 9: the same under a white force of {FORCE_STD:g} N on the load")
-    starts = {k: s for k, s in STARTS.items() if k in ("equilibrium", "printed") or not context.quick}
-    noise = (f"disturbance.force_std={FORCE_STD:g}", "disturbance.acts_on=load")
-    flights = context.pilot.fly(
-        [Request("hover", "paper-lqr", duration, (*start.overrides, *noise)) for start in starts.values()]
-    )
+    starts = noisy_starts(context.quick)
+    flights = context.pilot.fly(requests(context.quick)[1])
     others, rows = [], []
     for (key, start), flight in zip(starts.items(), flights, strict=True):
         vehicle = flight.vehicle_description
@@ -278,14 +293,8 @@ def _steady_state(context: Context) -> str:
     """What the LQR leaves when the load is heavier than it believes, and what the integrator makes of it."""
     ledger = context.ledger
     context.say("the steady-state error that motivates the integrator")
-    heavy = ("load.mass=11",)
-    plain, integral = context.pilot.fly(
-        [
-            Request("hover", "paper-lqr", 45.0, (), heavy),
-            Request("hover", "paper", 20.0, (), heavy),
-        ]
-    )
-    believed, actual = load_vehicle("paper"), load_vehicle("paper", heavy)
+    plain, integral = context.pilot.fly(requests(context.quick)[2])
+    believed, actual = load_vehicle("paper"), load_vehicle("paper", HEAVY)
     gain, _ = gains(believed, integral=False)
     # At rest: K_v dv + K_p dp = -(missing thrust), and dv - dp = the longer cable.
     missing = actual.hover_thrust - believed.hover_thrust

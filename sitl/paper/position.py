@@ -38,6 +38,12 @@ EXPECTED = {
 """For l₀ = 10 m errata.md and the figures to reach; for 1 m the continuous design, simulated beforehand."""
 
 
+def requests(quick: bool) -> list[Request]:
+    """The paper's design on each cable, and our default design on V.B's."""
+    paper = [Request("setpoint", "paper", DURATION, (f"cable.rest_length={length}",)) for length in LENGTHS]
+    return [*paper, Request("setpoint", "default", DURATION)]
+
+
 def section(context: Context) -> str:
     """The section's content."""
     return _figure_10(context) + _ways_in(context)
@@ -57,10 +63,7 @@ def law(vehicle: Vehicle, reference: Any, **how: Any) -> second.Law:
 def _figure_10(context: Context) -> str:
     ledger = context.ledger
     context.say("figure 10: to the set-point on 10 m and on 1 m of cable")
-    flights = context.pilot.fly(
-        [Request("setpoint", "paper", DURATION, (f"cable.rest_length={length}",)) for length in LENGTHS]
-        + [Request("setpoint", "default", DURATION)]
-    )
+    flights = context.pilot.fly(requests(context.quick))
     others, rows = [], []
     for length, flight in zip(LENGTHS, flights, strict=False):
         vehicle, name = flight.vehicle_description, f"figures.10.{length}"

@@ -45,6 +45,10 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
 )
 
 
+FLIGHTS = (position.requests, circling.requests, elasticity.requests)
+"""What flies besides the hover, in the order in which it is needed."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How a run came out."""
@@ -67,11 +71,15 @@ def run(out: Path, quick: bool, stop: StopRequest) -> Outcome:
     out.mkdir(parents=True, exist_ok=True)
     ledger = Ledger()
     with tempfile.TemporaryDirectory(prefix="sitl-paper-") as folder:
-        context = Context(ledger, Pilot(Path(folder), stop), quick, say)
-        sections = [(title, content(context)) for title, content in SECTIONS]
-        ledger.put(
-            "run", {"quick": quick, "flights": context.pilot.flown, "duration_s": time.monotonic() - begun}
-        )
+        pilot = Pilot(Path(folder), stop)
+        try:
+            for requests in (*lqr_hover.requests(quick), *(r(quick) for r in FLIGHTS)):
+                pilot.ask(requests)
+            context = Context(ledger, pilot, quick, say)
+            sections = [(title, content(context)) for title, content in SECTIONS]
+        finally:
+            pilot.close()
+        ledger.put("run", {"quick": quick, "flights": pilot.flown, "duration_s": time.monotonic() - begun})
     sections.insert(0, ("Verdicts", page.verdict_table(ledger)))
     sections.append(("Every number that was checked", page.check_table(ledger)))
     text = page.document(

@@ -1,4 +1,4 @@
-"""`sitl paper --quick`: every verdict as it was, every number within its tolerance, one page that needs nothing."""
+"""`sitl paper --quick`: every verdict stands, every number is within its tolerance, the page needs nothing."""
 
 from __future__ import annotations
 
