@@ -324,12 +324,13 @@ def _crossed(context: Context) -> str:
             ledger.at_least(
                 f"{name}.growth_of_10_on_1_1_s", float(growths[ten, one]), 1e-3, "1/s", "errata.md, V.B"
             )
+        stable = int(ledger.put(f"{name}.stable_pairs", int(np.sum(growths < 0.0))))
         blocks.append(
             page.figure(
                 _draw_crossed(growths, values, label),
                 f"<b>Designed for one {label.split()[0]}, flown on another.</b> Growth rate of the sampled "
                 "linear loop: "
-                "blue and negative is stable, red unstable.",
+                f"blue and negative is stable, red unstable. {stable} of {growths.size} pairs are stable.",
             )
         )
     return page.heading("Controllers on cables that they were not designed for") + "".join(blocks)
@@ -385,7 +386,8 @@ def _draw_crossed(growths: Array, values: Sequence[float], label: str) -> bytes:
     ax.set_xticks(range(len(values)), names)
     ax.set_yticks(range(len(values)), names)
     for (i, j), growth in np.ndenumerate(growths):
-        ax.text(j, i, f"{growth:.2f}", ha="center", va="center", fontsize=8)
+        colour = "white" if abs(growth) > 0.9 else "black"
+        ax.text(j, i, f"{growth:.2f}", ha="center", va="center", fontsize=8, color=colour)
     ax.set(xlabel=f"flown on {label}", ylabel=f"designed for {label}")
     figure.colorbar(image, label="growth rate [1/s]")
     return plots.png(figure)

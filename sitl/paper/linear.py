@@ -115,7 +115,12 @@ def _appendix_f(context: Context) -> str:
         if i < 6 or i > 14:
             continue  # the kinematic ones
         rows.append(
-            (f"[{STATES[i]}', {STATES[j]}]", printed_a[i, j], at_printed.A[i, j].item(), true.A[i, j].item())
+            (
+                f"[d{STATES[i]}/dt, {STATES[j]}]",
+                printed_a[i, j],
+                at_printed.A[i, j].item(),
+                true.A[i, j].item(),
+            )
         )
     return page.text(
         "Our Jacobian is written down by hand; a numerical one of the second simulation (what linmod does) "
@@ -383,7 +388,7 @@ def sorted_poles(poles: Any) -> list[complex]:
 
 def damping_ratio(pole: complex) -> float:
     """-Re/|p|; 0 for a pole at the origin."""
-    return -pole.real / abs(pole) if abs(pole) > 0 else 0.0
+    return -pole.real / abs(pole) + 0.0 if abs(pole) > 0 else 0.0
 
 
 def complex_text(pole: complex) -> str:
