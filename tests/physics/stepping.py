@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import MOST_ROTORS, PARAMETERS, Parameters
-from sitl_bridge.plant.state import STATE_SIZE
+from sitl_bridge.plant.parameters import PARAMETERS, Parameters
+from sitl_bridge.plant.state import CABLE_HOLDS, INNER_SIZE, MOST_ROTORS, STATE_SIZE
 from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -31,15 +31,33 @@ def fly(
 ) -> Array:
     """States (n + 1, 19) at every `every`-th of n·every steps; rotors and force (6,) held."""
     state = start.copy()
-    forces = np.zeros((dynamics.FORCE_ROWS, 6))
+    forces = np.zeros((dynamics.TABLE_ROWS, 6))
     forces[0] = force
     steps = round(duration / step)
-    advance = dynamics.advance.bind(record, state, padded(rotor_speed), forces, np.zeros((5, STATE_SIZE)))
+    advance = dynamics.advance.bind(*arrays(record, state, rotor_speed, forces))
     states = [start.copy()]
     for first in range(0, steps, every):
-        advance(first, steps, every, step)
+        advance(first, 0, steps, steps, every, step)
         states.append(state.copy())
     return np.array(states)
+
+
+def arrays(
+    record: Any, state: Array, rotor_speed: Sequence[float] | Array, forces: Array
+) -> tuple[Any, Array, Array, Array, Array, Array, Array]:
+    """The array arguments of `dynamics.advance`: still air, the cable whole, the rotors at their speeds."""
+    inner = np.zeros(INNER_SIZE)
+    inner[: len(rotor_speed)] = rotor_speed
+    inner[CABLE_HOLDS] = 1.0
+    return (
+        record,
+        state,
+        inner,
+        padded(rotor_speed),
+        forces,
+        np.zeros((dynamics.TABLE_ROWS, 6)),
+        np.zeros((dynamics.WORK_ROWS, STATE_SIZE)),
+    )
 
 
 def derivative(

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from stepping import Array, fields, fly, padded, rotor_speeds
 
 from sitl_bridge.plant import dynamics
 from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.plant.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, initial_state
+from sitl_bridge.plant.state import LOAD_POSITION, VEHICLE_POSITION, initial_state
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speed, load_vehicle
+from tests.physics.stepping import Array, arrays, fields, fly, padded, rotor_speeds
 
 
 def hover(vehicle: Vehicle, duration: float, every: int = 1) -> Array:
@@ -152,9 +152,8 @@ def test_compiled_and_plain_python_agree() -> None:
     speeds = rotor_speeds(vehicle, vehicle.hover_thrust, (0.05, -0.03, 0.02))
     force = np.array([1.0, -2.0, 0.5, 0.3, 0.2, -0.1])
     compiled = fly(record, initial_state(vehicle), speeds, 0.2, every=200, force=force)[-1]
-    plain, work = initial_state(vehicle), np.zeros((5, STATE_SIZE))
-    for _ in range(200):
-        dynamics.runge_kutta_4(fields(record), plain, padded(speeds), force, 1e-3, work)
+    plain = initial_state(vehicle)
+    dynamics.advance.python(*arrays([fields(record)], plain, speeds, force[None]), 0, 0, 200, 200, 200, 1e-3)
     np.testing.assert_allclose(compiled, plain, rtol=1e-13, atol=1e-14)
 
 
@@ -162,14 +161,14 @@ def test_held_forces_are_read_row_by_row() -> None:
     """Row k acts from step k·hold_steps on, wherever a call starts."""
     vehicle = load_vehicle("paper")
     generator = np.random.default_rng(3)
-    forces = generator.normal(size=(dynamics.FORCE_ROWS, 6))
+    forces = generator.normal(size=(dynamics.TABLE_ROWS, 6))
     record, speeds = parameters(vehicle), padded([hover_rotor_speed(vehicle)] * 4)
-    one, two, work = initial_state(vehicle), initial_state(vehicle), np.zeros((5, STATE_SIZE))
+    one, two = initial_state(vehicle), initial_state(vehicle)
     after = 0
     for steps in (4, 3, 10, 1, 22):
-        after = dynamics.advance(record, one, speeds, forces, work, after, 10, steps, 1e-3)
+        after += dynamics.advance(*arrays(record, one, speeds, forces), after, after, 10, 10, steps, 1e-3)
     assert after == 40
     for row in range(4):
-        held = np.tile(forces[row], (dynamics.FORCE_ROWS, 1))
-        dynamics.advance(record, two, speeds, held, work, 0, 10, 10, 1e-3)
+        held = np.tile(forces[row], (dynamics.TABLE_ROWS, 1))
+        dynamics.advance(*arrays(record, two, speeds, held), 0, 0, 10, 10, 10, 1e-3)
     np.testing.assert_array_equal(one, two)

@@ -11,8 +11,6 @@ import pytest
 from hypothesis import assume, given, settings
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
-from stepping import STEP, Array, derivative, fly
-from vehicles import Case, cases
 
 from sitl_bridge.plant.state import (
     ATTITUDE,
@@ -22,6 +20,8 @@ from sitl_bridge.plant.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
+from tests.physics.stepping import STEP, Array, derivative, fly
+from tests.physics.vehicles import Case, cases
 
 DURATION = 0.5
 STEPS = round(DURATION / STEP)

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
-from stepping import Array
 
 from sitl_bridge.plant.parameters import Parameters, parameters
 from sitl_bridge.plant.state import (
@@ -20,6 +19,7 @@ from sitl_bridge.plant.state import (
     VEHICLE_VELOCITY,
 )
 from sitl_bridge.vehicle import Vehicle
+from tests.physics.stepping import Array
 
 
 class Case(NamedTuple):
