@@ -129,7 +129,7 @@ def build_parser() -> argparse.ArgumentParser:
     paper = commands.add_parser(
         "paper",
         help="run every experiment of the paper, and write a page with a verdict on each",
-        description="Run every experiment of the paper, over the real link where a controller flies, and write "
+        description="Run every experiment of the paper, over the real link where a controller flies; write "
         "DIR/index.html and DIR/paper.json: what the paper shows, what we get, and a verdict on each claim. "
         "Exit code 1 when a number is out of its tolerance.",
     )

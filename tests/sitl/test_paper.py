@@ -1,4 +1,4 @@
-"""`sitl paper --quick`: every verdict stands, every number is within its tolerance, the page needs nothing."""
+"""`sitl paper --quick`: every verdict stands, every number is in tolerance, the page needs nothing else."""
 
 from __future__ import annotations
 
