@@ -72,6 +72,7 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Two terminals, in either order: `sitl plant --scenario setpoint` and "
         "`sitl controller --scenario setpoint`. Both at once, with a report: `sitl fly setpoint`.",
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     fly = commands.add_parser(
@@ -139,6 +140,15 @@ def build_parser() -> argparse.ArgumentParser:
     paper.add_argument("--quick", action="store_true", help="coarser sweeps, shorter flights: under a minute")
     paper.set_defaults(run=_paper)
     return parser
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("sitl-bridge")
+    except PackageNotFoundError:  # run from a source tree that nobody has installed
+        return "unknown"
 
 
 def _scenario_names() -> list[str]:
