@@ -61,11 +61,13 @@ class Outcome:
 def run(out: Path, quick: bool, stop: StopRequest) -> Outcome:
     """Run everything, write the page and the numbers into `out`.
 
-    Raises flights.FlightError when a flight does not come to its end.
+    Raises flights.FlightError when a flight does not come to its end, or when asked to stop.
     """
     begun = time.monotonic()
 
     def say(text: str) -> None:
+        if stop:
+            raise FlightError(f"stopped by {stop.reason}")
         print(f"paper: {time.monotonic() - begun:5.1f} s  {text}", file=sys.stderr, flush=True)
 
     out.mkdir(parents=True, exist_ok=True)
