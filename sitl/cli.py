@@ -82,6 +82,7 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Two terminals, in either order: `sitl plant --scenario setpoint` and "
         "`sitl controller --scenario setpoint`. Both at once, with a report: `sitl fly setpoint`.",
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     fly = commands.add_parser(
@@ -141,7 +142,29 @@ def build_parser() -> argparse.ArgumentParser:
         "--repeats", type=whole(1, 100, "a number"), default=5, help="measurements of each, for the median"
     )
     bench.set_defaults(run=_bench)
+
+    paper = commands.add_parser(
+        "paper",
+        help="run every experiment of the paper, and write a page with a verdict on each",
+        description="Run every experiment of the paper, over the real link where a controller flies; write "
+        "DIR/index.html and DIR/paper.json: what the paper shows, what we get, and a verdict on each claim. "
+        "Exit code 1 when a number is out of its tolerance.",
+    )
+    paper.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="where to write page and numbers"
+    )
+    paper.add_argument("--quick", action="store_true", help="coarser sweeps, shorter flights: under a minute")
+    paper.set_defaults(run=_paper)
     return parser
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("sitl-bridge")
+    except PackageNotFoundError:  # run from a source tree that nobody has installed
+        return "unknown"
 
 
 def _scenario_names() -> list[str]:
@@ -405,6 +428,12 @@ def _bench(arguments: argparse.Namespace) -> int:
     results = bench(arguments.repeats)
     print(json.dumps(results, indent=2) if arguments.json else table(results))
     return 0
+
+
+def _paper(arguments: argparse.Namespace) -> int:
+    from sitl.paper.run import main as paper
+
+    return paper(arguments.out, arguments.quick)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

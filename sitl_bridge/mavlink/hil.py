@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.ids import ACTUATOR_CONTROLS
+
 Record = NDArray[np.void]
 
 
@@ -52,7 +54,7 @@ HIL_GPS = _layout(
 )
 
 HIL_ACTUATOR_CONTROLS = _layout(
-    93, ("time_usec", "<u8"), ("flags", "<u8"), ("controls", "<f4", 16), ("mode", "u1")
+    93, ("time_usec", "<u8"), ("flags", "<u8"), ("controls", "<f4", ACTUATOR_CONTROLS), ("mode", "u1")
 )
 
 ODOMETRY = _layout(

@@ -101,7 +101,8 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         options.out.mkdir(parents=True, exist_ok=True)
         log = simulation.recorder = StateLog(options.out / FILE_NAME, simulation.world)
         tlog = TlogWriter(options.out / TLOG_NAME)
-    link = open_link(options.hil, speaker.say)
+    punctual = options.clock == "realtime" or bool(options.faults.link)
+    link = open_link(options.hil, speaker.say, punctual)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
     if options.faults.link:
@@ -164,7 +165,6 @@ def _loop(
     station: Station | None,
     stop: StopRequest,
 ) -> None:
-    gc.collect()
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     epoch = time.time() - time.monotonic()
     clock.start(time.monotonic())
