@@ -29,6 +29,13 @@ RATE_HZ = 250.0
 STEPS = 20_000
 TRIPS = 7_500
 FLIGHT_S = 30.0
+FULL = (
+    "initial.start=hover",
+    "sensors.preset=urban",
+    "air.wind=[3.0, 1.0, 0.0]",
+    "air.turbulence.wind_at_6_m=7.7",
+)
+"""What makes `iris`, which has ground, rotor lag, drag and a battery, a plant with everything on."""
 
 
 def free_udp_port() -> int:
@@ -73,10 +80,10 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     return len(simulation.datagram()), len(writer.answer(4000, True))
 
 
-def lockstep_flight(scenario: str) -> dict[str, Any]:
+def lockstep_flight(scenario: str, *more: str) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     port = free_udp_port()
-    common = ["--scenario", scenario, "--rate", str(RATE_HZ)]
+    common = ["--scenario", scenario, "--rate", str(RATE_HZ), *more]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
     controller = [*common, "--hil", f"udpin:127.0.0.1:{port}"]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
@@ -99,6 +106,8 @@ def launch_to_first_command_s() -> float:
 def bench(repeats: int) -> dict[str, float]:
     """Medians over so many repeats; progress on standard error."""
     vehicle = load_vehicle("paper", ["cable.rest_length=10"])
+    full = load_vehicle("iris", FULL)
+    full_options = ["--vehicle", "iris", *(word for change in FULL for word in ("--set", change))]
     sizes = datagram_sizes(vehicle)
     samples: dict[str, list[float]] = {}
     for repeat in range(repeats):
@@ -112,6 +121,13 @@ def bench(repeats: int) -> dict[str, float]:
             "real_time_factor": factor,
             "launch_to_first_command_s": launch_to_first_command_s(),
         }
+        full_factor = lockstep_flight("hover", *full_options)["real_time_factor"]
+        measured["physics_step_us_full"] = physics_step_us(full)
+        measured["lockstep_tick_us_full"] = 1e6 / (full_factor * RATE_HZ)
+        measured["physics_step_full_ratio"] = measured["physics_step_us_full"] / measured["physics_step_us"]
+        measured["lockstep_tick_full_ratio"] = (
+            measured["lockstep_tick_us_full"] / measured["lockstep_tick_us"]
+        )
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():
             samples.setdefault(key, []).append(value)
