@@ -1,0 +1,128 @@
+"""Flies the flights of docs/faults.md: prints the table, draws docs/images/faults.png.
+
+    python scripts/fault_flights.py
+
+Plant and autopilot as they are, on a clock of their own instead of a wall clock, in one process; `iris` at
+250 Hz, hovering with its load, fed back truth, one fault from t = 5 s on.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from controller.autopilot import Autopilot  # noqa: E402
+from controller.hil.session import new_session  # noqa: E402
+from controller.reference import setpoint  # noqa: E402
+from sitl_bridge.plant.faults import Faults  # noqa: E402
+from sitl_bridge.plant.link_faults import FaultyPath  # noqa: E402
+from sitl_bridge.plant.notices import Notices  # noqa: E402
+from sitl_bridge.plant.realtime import Realtime  # noqa: E402
+from sitl_bridge.plant.simulation import Simulation  # noqa: E402
+from sitl_bridge.vehicle import load_vehicle, validated  # noqa: E402
+
+RATE = 250.0
+AT, END = 5.0, 25.0
+TICK_OF_CLOCK = 1e-7  # s, so that rounding never leaves a datagram just ahead
+START = ["initial.start=hover", "initial.load_position=[0.0, 0.0, 20.0]"]
+
+FLIGHTS = {
+    "none": {},
+    "accelerometer stuck": {"sensor": [{"sensor": "accelerometer", "failure": "stuck", "at": AT}]},
+    "GPS lost": {"sensor": [{"sensor": "gps", "failure": "lost", "at": AT}]},
+    "rotor 1 at 90 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.9, "at": AT}]},
+    "rotor 1 at 70 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.7, "at": AT}]},
+    "rotor 1 off for 0.1 s": {"rotor": [{"rotor": 1, "thrust": 0.0, "at": AT, "duration": 0.1}]},
+    "rotor 1 off": {"rotor": [{"rotor": 1, "thrust": 0.0, "at": AT}]},
+    "cable snaps": {"cable": [{"at": AT}]},
+    "load twice as heavy": {"load": [{"mass": 0.6, "at": AT}]},
+    "gust of 8 m/s, 2 s": {"gust": [{"start": AT, "duration": 2.0, "peak": [8.0, 0.0, 0.0]}]},
+    "link: 20 % dropped": {"link": [{"failure": "drop", "share": 0.2, "at": AT}]},
+    "link: 5 ms late each way": {"link": [{"failure": "delay", "delay": 0.005, "at": AT}]},
+    "link: 10 ms late each way": {"link": [{"failure": "delay", "delay": 0.01, "at": AT}]},
+    "link: 20 ms late each way": {"link": [{"failure": "delay", "delay": 0.02, "at": AT}]},
+    "link: jitter up to 10 ms": {"link": [{"failure": "jitter", "delay": 0.01, "at": AT}]},
+    "link: all doubled": {"link": [{"failure": "duplicate", "delay": 0.003, "at": AT}]},
+    "link: 20 % reordered": {"link": [{"failure": "reorder", "share": 0.2, "delay": 0.006, "at": AT}]},
+    "link: stall of 0.1 s": {"link": [{"failure": "stall", "at": AT, "duration": 0.1}]},
+    "link: stall of 1 s": {"link": [{"failure": "stall", "at": AT, "duration": 1.0}]},
+}
+DRAWN = (
+    "rotor 1 at 90 % thrust",
+    "load twice as heavy",
+    "gust of 8 m/s, 2 s",
+    "cable snaps",
+    "link: stall of 0.1 s",
+)
+
+
+def fly(table: dict[str, list[dict[str, object]]]) -> NDArray[np.float64]:
+    """One flight with these faults: rows of time and state (n, 20), a tick each, to its end or the ground."""
+    faults = validated(Faults, table, "table")
+    vehicle = load_vehicle("iris", START)
+    simulation = Simulation(vehicle, RATE, seed=0, duration_s=END, faults=faults)
+    clock = Realtime(simulation, Notices(lambda text: None), 0)
+    session = new_session(
+        lambda controls: Autopilot(vehicle, "default", RATE, lambda at: setpoint(at, at), controls),
+        0,
+        lambda text: None,
+    )
+    paths = [FaultyPath(faults.link, way, 0) for way in ("to_autopilot", "to_plant")]
+    clock.start(0.0)
+    now, began, rows = 0.0, None, []
+    while not clock.finished:
+        for datagram in clock.to_send(now):
+            paths[0].receive(datagram, now - began if began is not None else -1.0)
+        for path, receiver in zip(paths, (session, clock), strict=True):
+            for datagram in path.to_send(now - began if began is not None else -1.0):
+                receiver.receive(datagram, now)
+            for datagram in session.to_send(now):
+                paths[1].receive(datagram, now - began if began is not None else -1.0)
+        if simulation.started and began is None:
+            began = now
+        if simulation.started and (not rows or rows[-1][0] != simulation.scenario_time):
+            rows.append(np.concatenate([[simulation.scenario_time], simulation.world.state]))
+            if simulation.world.state[2] < 0.5:
+                break
+        arrivals = [path.next_deadline() for path in paths]
+        upcoming = min([clock.next_deadline(), *((began or 0.0) + at for at in arrivals if at is not None)])
+        now = max(now, upcoming + TICK_OF_CLOCK)
+    return np.array(rows)
+
+
+def tilt(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Angle of the vehicle's z axis from the vertical, deg."""
+    x, y = rows[:, 8], rows[:, 9]
+    return np.degrees(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1, 1)))
+
+
+def main() -> None:
+    """Fly, print, draw."""
+    figure, axes = plt.subplots(figsize=(8, 4.5), layout="constrained")
+    print("| fault at 5 s | vehicle strays by, m | largest tilt, deg | 20 s later, m | outcome |")
+    print("|---|---|---|---|---|")
+    for name, table in FLIGHTS.items():
+        rows = fly(table)
+        after = rows[rows[:, 0] >= AT]
+        away = np.linalg.norm(after[:, 1:4] - rows[0, 1:4], axis=1)
+        down = rows[-1, 3] < 0.5
+        outcome = f"on the ground at {rows[-1, 0]:.1f} s" if down else "flies on"
+        last = "-" if down else f"{away[-1]:.2f}"
+        print(f"| {name} | {away.max():.2f} | {tilt(after).max():.0f} | {last} | {outcome} |", flush=True)
+        if name in DRAWN:
+            axes.plot(after[:, 0], away, label=name)
+    axes.set(xlabel="t / s", ylabel="vehicle from where it hovered / m", xlim=(4, 20))
+    axes.legend()
+    axes.grid(alpha=0.3)
+    figure.savefig(ROOT / "docs" / "images" / "faults.png", dpi=110)
+
+
+if __name__ == "__main__":
+    main()
