@@ -29,6 +29,8 @@ class Recorder(Protocol):
 
 
 NO_FAULTS = Faults()
+BATTERY_STEP = 0.04
+"""So often the battery is drawn on, s: its charge needs no tick."""
 
 
 class Paced:
@@ -94,6 +96,7 @@ class Simulation:
             rate_hz,
         )
         self._power = self.world.battery(0.0)
+        self._battery_every = max(1, round(BATTERY_STEP * rate_hz))
         self._state = Paced()
         self._under_way: deque[Sequence[float]] = deque()
         self._datagram: bytes | None = None
@@ -174,7 +177,8 @@ class Simulation:
     def finish_tick(self) -> None:
         """The tick is over: the next one is the current one; the scenario's last is recorded too."""
         self.ticks_flown += 1
-        self._power = self.world.battery(self.period)
+        if self.ticks_flown % self._battery_every == 0:
+            self._power = self.world.battery(self._battery_every * self.period)
         self._apply_faults()
         self.next_tick()
         if self.finished:
