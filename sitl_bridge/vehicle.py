@@ -256,6 +256,11 @@ def vehicle_names() -> list[str]:
     return shipped(resources.files(__package__) / "vehicles")
 
 
+def preset_names() -> list[str]:
+    """Names of the sensor presets that come with the package."""
+    return shipped(resources.files(__package__) / "presets")
+
+
 def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str, Any]]:
     """Read a shipped TOML file by name, or any by path; returns (source for messages, content).
 

@@ -69,6 +69,17 @@ ODOMETRY = _layout(
     ("quality", "i1"),
 )
 
+HIL_STATE_QUATERNION = _layout(
+    115,
+    ("time_usec", "<u8"),
+    ("attitude_quaternion", "<f4", 4),
+    *((name, "<f4") for name in ("rollspeed", "pitchspeed", "yawspeed")),
+    *((name, "<i4") for name in ("lat", "lon", "alt")),
+    *((name, "<i2") for name in ("vx", "vy", "vz")),
+    *((name, "<u2") for name in ("ind_airspeed", "true_airspeed")),
+    *((name, "<i2") for name in ("xacc", "yacc", "zacc")),
+)
+
 MODE_FLAG_ARMED = 128
 """Bit of HIL_ACTUATOR_CONTROLS.mode (MAV_MODE_FLAG_SAFETY_ARMED)."""
 FLAG_LOCKSTEP = 1
