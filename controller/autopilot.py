@@ -12,6 +12,7 @@ from controller.law import WORK, engaged_memory
 from controller.reference import Path
 from controller.state import LOAD_POSITION, Array
 from controller.step import control_step
+from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle import Vehicle
 
 PathFrom = Callable[[tuple[float, float, float]], Path]
@@ -38,7 +39,10 @@ class Autopilot:
         self.armed = False
         self._step = None
 
-    def step(self, estimate: Array) -> None:
+    def hear(self, frame: Frame, now: float) -> None:
+        """Anything else from the plant has no effect."""
+
+    def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
         if self._step is None:
             load = estimate[LOAD_POSITION]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -16,6 +17,7 @@ from controller.state import (
     EULER_ANGLES,
     LOAD_POSITION,
     LOAD_VELOCITY,
+    OWN_STATES,
     STATE_SIZE,
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
@@ -39,11 +41,29 @@ def paper_lqr_weights() -> Weights:
     return Weights(np.eye(STATE_SIZE), np.eye(WRENCH_SIZE))
 
 
-def default_weights(vehicle: Vehicle) -> Weights:
+class Emphasis(NamedTuple):
+    """Factors on the default design's weights."""
+
+    vehicle_position: float = 1.0
+    load_position: float = 1.0
+    vehicle_velocity: float = 1.0
+    load_velocity: float = 1.0
+    body_rates: float = 1.0
+    attitude: float = 1.0
+    integral: float = 1.0
+    thrust: float = 1.0
+    moments: float = 1.0
+
+
+EVEN = Emphasis()
+
+
+def default_weights(vehicle: Vehicle, emphasis: Emphasis = EVEN, loaded: bool = True) -> Weights:
     """Weights by largest acceptable deviation (Bryson's rule), the inputs scaled to the vehicle.
 
-    Moments are weighed as angular accelerations and thrust as an acceleration of the whole, so that the
-    bandwidth, and with it the delay margin, is much the same for every size of vehicle.
+    Without its load the vehicle's own position takes the place of the load's. Moments are weighed as angular
+    accelerations and thrust as an acceleration of the whole, so that the bandwidth, and with it the delay
+    margin, is much the same for every size of vehicle.
     """
     nowhere = 1e3  # m: the vehicle's own position matters only through the load's
     position, velocity, integral = 0.5, 0.5, 0.6  # m, m/s, m s
@@ -55,9 +75,17 @@ def default_weights(vehicle: Vehicle) -> Weights:
     deviations[BODY_RATES], deviations[EULER_ANGLES] = rate, (tilt, tilt, yaw)
     deviations[STATE_SIZE:] = integral
     mass = vehicle.airframe.mass + vehicle.load.mass
+    if not loaded:
+        deviations[VEHICLE_POSITION], mass = position, vehicle.airframe.mass
     inertia = np.array(vehicle.airframe.inertia)
     efforts = np.array([mass * acceleration, *(inertia * (angular, angular, turning))])
-    return Weights(np.diag(deviations**-2.0), np.diag(efforts**-2.0))
+    e = emphasis
+    own = e.vehicle_position if loaded else e.load_position  # the position that matters
+    on_states = np.repeat(
+        [own, e.load_position, e.vehicle_velocity, e.load_velocity, e.body_rates, e.attitude, e.integral], 3
+    )
+    on_inputs = np.array([e.thrust, e.moments, e.moments, e.moments])
+    return Weights(np.diag(deviations**-2.0 * on_states), np.diag(efforts**-2.0 * on_inputs))
 
 
 def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
@@ -74,24 +102,39 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     raise ValueError(f"no design {name!r}; expected one of {', '.join(DESIGNS)}")
 
 
-def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int) -> Design:
+def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) -> tuple[Design, Design]:
+    """What flies under ground control: the default design, and its like for the vehicle on a slack cable."""
+    loaded, alone = (
+        design_for(vehicle, rate_hz, default_weights(vehicle, emphasis, with_load), FEEDFORWARD, with_load)
+        for with_load in (True, False)
+    )
+    return loaded, alone
+
+
+def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int, loaded: bool = True) -> Design:
     """The design that minimises a cost in the sampled loop of a vehicle: a record of shape (1,).
 
     weights: Q (18, 18), or (21, 21) with the integral of the load's position, and R (4, 4).
-    entry: how the reference enters, see `law`.
+    entry: how the reference enters, see `law`. Not loaded: the vehicle alone, the integral being of its own
+    position; the load's weights have no effect.
     """
     period, delay = 1.0 / rate_hz, vehicle.loop.delay_ticks
     assert delay <= LONGEST_DELAY
-    model = actuated_model(vehicle)
+    model = actuated_model(vehicle, loaded)
     size = model.A.shape[0]
-    lag, integral = slice(STATE_SIZE, size), slice(size, size + len(weights.Q) - STATE_SIZE)
+    states = list(range(STATE_SIZE)) if loaded else list(OWN_STATES)
+    rigid = len(states)
+    lag, integral = slice(rigid, size), slice(size, size + len(weights.Q) - STATE_SIZE)
     if integral.stop > size:
-        model = with_integrator(model)
-    gain = sampled_gain(sampled_model(model, _with_lag(weights, size), period), delay)
+        model = with_integrator(model, LOAD_POSITION if loaded else VEHICLE_POSITION)
+    used = [*states, *range(STATE_SIZE, len(weights.Q))]
+    weights = Weights(weights.Q[np.ix_(used, used)], weights.R)
+    gain = sampled_gain(sampled_model(model, _with_lag(weights, rigid, size), period), delay)
 
     record = np.zeros(1, dtype=DESIGN)
     record["entry"], record["period"], record["delay"] = entry, period, delay
-    record["state_gain"] = gain.state[:, :STATE_SIZE]
+    record["controlled"] = (LOAD_POSITION if loaded else VEHICLE_POSITION).start
+    record["state_gain"][0][:, states] = gain.state[:, :rigid]
     record["past_gain"][0, :delay] = gain.past
     time_constant = rotor_time_constant(vehicle)
     # A command acts, on average over its period, half a period after the delay; lagging rotors later still.
@@ -104,13 +147,14 @@ def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int) -
         record["integral_gain"] = integral_gain
         record["anti_windup"] = -np.linalg.pinv(integral_gain) * period / ANTI_WINDUP_TIME
     record["hover_state"][0, VEHICLE_POSITION] = (0.0, 0.0, vehicle.hover_length)
-    record["hover_wrench"][0, 0] = vehicle.hover_thrust
-    record["body"] = body(vehicle)
+    mass = vehicle.airframe.mass + (vehicle.load.mass if loaded else 0.0)
+    record["hover_wrench"][0, 0] = mass * vehicle.gravity
+    record["body"] = body(vehicle, loaded)
     return record
 
 
-def _with_lag(weights: Weights, size: int) -> Weights:
-    """Weights for a model of `size` states before the integral: what lagging rotors give costs nothing."""
-    state, integral = weights.Q[:STATE_SIZE, :STATE_SIZE], weights.Q[STATE_SIZE:, STATE_SIZE:]
-    lag = np.zeros((size - STATE_SIZE, size - STATE_SIZE))
+def _with_lag(weights: Weights, rigid: int, size: int) -> Weights:
+    """Weights for a model of `rigid` states, `size` with the lag: what lagging rotors give costs nothing."""
+    state, integral = weights.Q[:rigid, :rigid], weights.Q[rigid:, rigid:]
+    lag = np.zeros((size - rigid, size - rigid))
     return Weights(linalg.block_diag(state, lag, integral), weights.R)

@@ -47,14 +47,14 @@ BODY = np.dtype(
 )
 
 
-def body(vehicle: Vehicle) -> np.void:
-    """What the feed-forward needs to know of a vehicle, SI units."""
+def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
+    """What the feed-forward needs to know of a vehicle, with its load or alone, SI units."""
     cable = vehicle.cable
     record = np.zeros(1, dtype=BODY)
     record[0] = (
         vehicle.gravity,
         vehicle.airframe.mass,
-        vehicle.load.mass,
+        vehicle.load.mass if loaded else 0.0,
         cable.stiffness,
         cable.damping,
         cable.rest_length,
@@ -65,7 +65,15 @@ def body(vehicle: Vehicle) -> np.void:
 
 @kernel
 def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
-    """Where the vehicle is for the load's derivatives r (6, 3), and how the cable pulls the load."""
+    """Where the vehicle is for the load's derivatives r (6, 3), and how the cable pulls the load.
+
+    Without a load the derivatives are the vehicle's own.
+    """
+    if b.load_mass == 0.0:
+        for i in range(3):
+            load[i] = vehicle[i] = r[0, i]
+            pull[i] = 0.0
+        return
     squared, slope = 0.0, 0.0
     for i in range(3):
         upward = r[2, i] + (b.gravity if i == 2 else 0.0)
@@ -82,10 +90,15 @@ def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
 
 
 @kernel
-def flat_motion(b: Any, path: Any, t: float, lead: float, stencil: Any, state: Array, wrench: Array) -> None:
-    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path, yaw at zero."""
+def flat_motion(
+    b: Any, path: Any, t: float, lead: float, heading: Array, stencil: Any, state: Array, wrench: Array
+) -> None:
+    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path.
+
+    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading.
+    """
     h = STENCIL_STEP
-    at_rest = path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h
+    at_rest = not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h
     first, last = (POINTS // 2, POINTS // 2 + 1) if at_rest else (0, POINTS)
     for j in range(first, last):
         feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
@@ -95,6 +108,7 @@ def flat_motion(b: Any, path: Any, t: float, lead: float, stencil: Any, state: A
     for i in range(3):
         state[i] = stencil.vehicle[2, i]
         state[3 + i] = stencil.load[2, i]
+    state[17] = path.yaw
     wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
     if at_rest:
         return
@@ -104,7 +118,8 @@ def flat_motion(b: Any, path: Any, t: float, lead: float, stencil: Any, state: A
             acceleration = (before - 2.0 * here + after) / (h * h)
             stencil.force[j, i] = b.vehicle_mass * acceleration + stencil.pull[j, i]
         stencil.force[j, 2] += b.vehicle_mass * b.gravity
-        x, y, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
+        east, north, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
+        x, y = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east
         stencil.thrust[j] = math.sqrt(x * x + y * y + z * z)
         stencil.tilt[j, 0] = -math.asin(y / stencil.thrust[j])
         stencil.tilt[j, 1] = math.atan2(x, z)
@@ -114,9 +129,10 @@ def flat_motion(b: Any, path: Any, t: float, lead: float, stencil: Any, state: A
     roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
     roll_rate = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
     pitch_rate = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
-    # Body rates from Euler rates with the yaw at rest (eq. 14).
-    state[12] = roll_rate
-    state[13] = math.cos(roll) * pitch_rate
-    state[14] = -math.sin(roll) * pitch_rate
+    # Body rates from Euler rates (eq. 14).
+    upright = math.cos(pitch) * path.yaw_rate
+    state[12] = roll_rate - math.sin(pitch) * path.yaw_rate
+    state[13] = math.cos(roll) * pitch_rate + math.sin(roll) * upright
+    state[14] = -math.sin(roll) * pitch_rate + math.cos(roll) * upright
     state[15], state[16] = roll, pitch
     wrench[0] = stencil.thrust[2] + lead * (stencil.thrust[3] - stencil.thrust[1]) / (2.0 * h)

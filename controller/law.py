@@ -1,4 +1,4 @@
-"""The control law: integral LQR on the load's position, one pure step.
+"""The control law: integral LQR on the load's position (or the vehicle's, alone), one pure step.
 
 u = u* - K·[x - x*; v] - sum of K_past·(u_past - u*_past), v = the integral of (p_p - p_ref): eqs. 54 to 56,
 corrected, with the loop's delay; where rotors lag, also - K_lag·(what they give now - u*). It knows nothing
@@ -32,6 +32,7 @@ INTEGRATOR, FEEDFORWARD, STATE = 0, 1, 2
 DESIGN = np.dtype(
     [
         ("entry", "i8"),
+        ("controlled", "i8"),  # where in the state the position is that the reference is for: load or vehicle
         ("period", "f8"),  # s
         ("state_gain", "f8", (WRENCH_SIZE, STATE_SIZE)),
         ("lag_gain", "f8", (WRENCH_SIZE, WRENCH_SIZE)),  # on the wrench that lagging rotors give
@@ -63,10 +64,12 @@ WORK = np.dtype(
         ("reference", "f8", 3),  # p_ref, m
         ("deviation", "f8", STATE_SIZE),  # x - x*
         ("desired", "f8", STATE_SIZE),  # x*
+        ("integral", "f8", 3),  # v, m s, in the heading's frame
         ("feedforward", "f8", WRENCH_SIZE),  # u*
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
+        ("heading", "f8", 2),  # cosine and sine of the reference's yaw
         ("stencil", STENCIL),
     ]
 )
@@ -85,13 +88,34 @@ def engaged_memory(load_position: Array) -> Memory:
 
 
 @kernel
+def _turn(cosine: float, sine: float, vector: Array) -> None:
+    """Turn a vector (3,) about the vertical."""
+    x, y = vector[0], vector[1]
+    vector[0], vector[1] = cosine * x - sine * y, sine * x + cosine * y
+
+
+@kernel
 def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, work: Any) -> None:
-    """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s)."""
+    """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s).
+
+    The model is linear about a yaw of zero: its x axis is the heading, and horizontal deviations are turned
+    into that frame. Roll and pitch are towards the heading anyway.
+    """
+    work.heading[0], work.heading[1] = math.cos(path.yaw), math.sin(path.yaw)
     if design.entry == FEEDFORWARD:
         # What is commanded now acts after the delay and the rotors' lag, held for a period.
-        flat_motion(design.body, path, t, design.lead_time, work.stencil, work.desired, work.feedforward)
+        flat_motion(
+            design.body,
+            path,
+            t,
+            design.lead_time,
+            work.heading,
+            work.stencil,
+            work.desired,
+            work.feedforward,
+        )
         for axis in range(3):
-            work.reference[axis] = work.desired[3 + axis]
+            work.reference[axis] = work.desired[design.controlled + axis]
     else:
         path_derivatives(path, t, work.stencil.derivatives)
         for i in range(STATE_SIZE):
@@ -103,8 +127,11 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
             origin = work.reference[axis] if design.entry == STATE else memory.anchor[axis]
             work.desired[axis] += origin
             work.desired[3 + axis] += origin
+        work.desired[17] = path.yaw
     for i in range(STATE_SIZE):
         work.deviation[i] = estimate[i] - work.desired[i]
+    for i in range(0, 12, 3):  # both positions, both velocities
+        _turn(work.heading[0], -work.heading[1], work.deviation[i : i + 3])
     yaw = STATE_SIZE - 1
     work.deviation[yaw] -= 2.0 * math.pi * math.floor(work.deviation[yaw] / (2.0 * math.pi) + 0.5)
 
@@ -117,17 +144,19 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
     """
     deviation(design, memory, path, memory.ticks * design.period, estimate, work)
     for axis in range(3):
-        error = estimate[3 + axis] - work.reference[axis]
+        error = estimate[design.controlled + axis] - work.reference[axis]
         if memory.ticks > 0:  # trapezoidal rule between the samples
             memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
         memory.last_error[axis] = error
+        work.integral[axis] = memory.integral[axis]
+    _turn(work.heading[0], -work.heading[1], work.integral)
     memory.ticks += 1
     for k in range(WRENCH_SIZE):
         u = work.feedforward[k]
         for i in range(STATE_SIZE):
             u -= design.state_gain[k, i] * work.deviation[i]
         for axis in range(3):
-            u -= design.integral_gain[k, axis] * memory.integral[axis]
+            u -= design.integral_gain[k, axis] * work.integral[axis]
         for j in range(WRENCH_SIZE):
             u -= design.lag_gain[k, j] * memory.rotors[j]
             for age in range(design.delay):
@@ -151,4 +180,7 @@ def remember(design: Any, memory: Any, work: Any) -> None:
         memory.past[0, k] = under_way
     for axis in range(3):
         for k in range(WRENCH_SIZE):
-            memory.integral[axis] += design.anti_windup[axis, k] * (work.achieved[k] - work.wrench[k])
+            work.integral[axis] += design.anti_windup[axis, k] * (work.achieved[k] - work.wrench[k])
+    _turn(work.heading[0], work.heading[1], work.integral)
+    for axis in range(3):
+        memory.integral[axis] = work.integral[axis]

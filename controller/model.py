@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.state import LOAD_POSITION, STATE_SIZE, WRENCH_SIZE, Array
+from controller.state import LOAD_POSITION, OWN_STATES, STATE_SIZE, WRENCH_SIZE, Array
 from sitl_bridge.vehicle import Vehicle
 
 
@@ -52,10 +52,18 @@ def linear_model(vehicle: Vehicle, length: float | None = None, thrust: float | 
     return LinearModel(a, b)
 
 
-def actuated_model(vehicle: Vehicle) -> LinearModel:
+def unloaded_model(vehicle: Vehicle) -> LinearModel:
+    """Linearise the vehicle alone, hovering upright: the 12 states that are its own, `OWN_STATES`."""
+    model = linear_model(vehicle, thrust=vehicle.airframe.mass * vehicle.gravity)
+    a = model.A[np.ix_(OWN_STATES, OWN_STATES)]
+    a[3:6, 0:6] = 0.0  # no cable
+    return LinearModel(a, model.B[list(OWN_STATES)])
+
+
+def actuated_model(vehicle: Vehicle, loaded: bool = True) -> LinearModel:
     """The model at hover from the commanded wrench on: with the lag of the rotors, if they have one."""
     time_constant = rotor_time_constant(vehicle)
-    model = linear_model(vehicle)
+    model = linear_model(vehicle) if loaded else unloaded_model(vehicle)
     return with_rotor_lag(model, time_constant) if time_constant > 0.0 else model
 
 
@@ -72,20 +80,21 @@ def with_rotor_lag(model: LinearModel, time_constant: float) -> LinearModel:
 
     time_constant: s, above 0. The inputs become the commanded wrench.
     """
-    size = STATE_SIZE + WRENCH_SIZE
+    rigid = model.A.shape[0]
+    size = rigid + WRENCH_SIZE
     a = np.zeros((size, size))
-    a[:STATE_SIZE, :STATE_SIZE] = model.A
-    a[:STATE_SIZE, STATE_SIZE:] = model.B
-    a[STATE_SIZE:, STATE_SIZE:] = -np.eye(WRENCH_SIZE) / time_constant
+    a[:rigid, :rigid] = model.A
+    a[:rigid, rigid:] = model.B
+    a[rigid:, rigid:] = -np.eye(WRENCH_SIZE) / time_constant
     b = np.zeros((size, WRENCH_SIZE))
-    b[STATE_SIZE:] = np.eye(WRENCH_SIZE) / time_constant
+    b[rigid:] = np.eye(WRENCH_SIZE) / time_constant
     return LinearModel(a, b)
 
 
-def with_integrator(model: LinearModel) -> LinearModel:
-    """Append the integral of the load's position as three states (eq. 55, corrected)."""
+def with_integrator(model: LinearModel, position: slice = LOAD_POSITION) -> LinearModel:
+    """Append the integral of a position, the load's, as three states (eq. 55, corrected)."""
     size = model.A.shape[0]
     a = np.zeros((size + 3, size + 3))
     a[:size, :size] = model.A
-    a[size:, LOAD_POSITION] = np.eye(3)
+    a[size:, position] = np.eye(3)
     return LinearModel(a, np.vstack([model.B, np.zeros((3, WRENCH_SIZE))]))

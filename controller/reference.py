@@ -2,7 +2,8 @@
 
 A path is one flat record, so that compiled code evaluates it at every tick. `raw` gives the position that
 the paper feeds to its integrator, steps and all; `feasible` leaves the start smoothly, so that a feed-forward
-can follow it exactly.
+can follow it exactly. A path can also be given moment by moment (`local_path`), by somebody who shapes it as
+the flight goes on.
 """
 
 from __future__ import annotations
@@ -26,6 +27,11 @@ PATH = np.dtype(
         ("radius", "f8"),  # m, 0 for a set-point
         ("angular_rate", "f8"),  # rad/s
         ("ramp_time", "f8"),  # s, in which a feasible path goes over from the start to the path
+        ("yaw", "f8"),  # rad
+        ("yaw_rate", "f8"),  # rad/s
+        ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
+        ("epoch", "f8"),  # s, path time of `motion`
+        ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
     ]
 )
 
@@ -71,6 +77,13 @@ def circle(
     return path
 
 
+def local_path() -> Path:
+    """A path (1,) that is the Taylor polynomial of `motion` around `epoch`, which its owner writes."""
+    path = np.zeros(1, dtype=PATH)
+    path["local"] = 1
+    return path
+
+
 LARGEST_SPEED = 5.0
 """m/s, of the ramp's own share of a feasible motion."""
 LARGEST_ACCELERATION = 2.5
@@ -91,8 +104,22 @@ def _ramp_time(path: Path) -> float:
 
 
 @kernel
+def _taylor(motion: Array, t: float, out: Array) -> None:
+    """The motion whose derivatives at 0 are motion (6, 3), and its derivatives at time t (s)."""
+    for i in range(3):
+        for n in range(DERIVATIVES + 1):
+            value = 0.0
+            for k in range(DERIVATIVES, n - 1, -1):
+                value = motion[k, i] + value * t / (k - n + 1)
+            out[n, i] = value
+
+
+@kernel
 def path_derivatives(path: Any, t: float, out: Array) -> None:
     """The path itself at time t (s): row k of out (6, 3) is its k-th derivative."""
+    if path.local:
+        _taylor(path.motion, t - path.epoch, out)
+        return
     quarter = 0.5 * math.pi
     power = path.radius
     for k in range(DERIVATIVES + 1):
@@ -126,7 +153,7 @@ def feasible(path: Any, t: float, out: Array, scratch: Array) -> None:
     scratch: (6,).
     """
     path_derivatives(path, t, out)
-    if t >= path.ramp_time:
+    if path.local or t >= path.ramp_time:
         return
     smooth_step(max(0.0, t) / path.ramp_time, scratch)
     scale = 1.0

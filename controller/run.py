@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from controller.autopilot import Autopilot, PathFrom
 from controller.hil.session import HilSession, new_session
@@ -13,6 +13,10 @@ from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from controller.ground_link import GroundOptions
+    from controller.guided_run import Guided
 
 
 @dataclass(frozen=True)
@@ -23,11 +27,14 @@ class ControllerOptions:
     hil: Address
     design: str
     rate_hz: float
-    path_from: PathFrom
+    path_from: PathFrom | None
+    """None: ground control says when to arm and where to go."""
     instance: int = 0
     duration_s: float | None = None
     drop_percent: float = 0.0
     seed: int = 0
+    ground: GroundOptions | None = None
+    """With `path_from` None: how ground control reaches the vehicle."""
 
 
 def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
@@ -38,21 +45,29 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
-    session = new_session(
-        lambda controls: Autopilot(
-            options.vehicle, options.design, options.rate_hz, options.path_from, controls
-        ),
-        options.instance,
-        speaker.say,
-    )
+    guided: Guided | None = None
+    if options.path_from is None:
+        from controller.guided_run import Guided
+
+        guided = Guided(options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say)
+        session = new_session(guided.autopilot, options.instance, speaker.say)
+    else:
+        path_from = options.path_from
+        session = new_session(
+            lambda controls: Autopilot(options.vehicle, options.design, options.rate_hz, path_from, controls),
+            options.instance,
+            speaker.say,
+        )
     speaker.say(
         f"{options.vehicle.name}, {options.design} design at {options.rate_hz:g} Hz, "
         f"waiting for a plant on {options.hil} (system {options.instance + 1})"
     )
     most_steps = None if options.duration_s is None else round(options.duration_s * options.rate_hz)
     try:
-        _loop(session, link, most_steps, stop)
+        _loop(session, link, most_steps, stop, guided)
     finally:
+        if guided is not None:
+            guided.close()
         link.close()
     if stop:
         speaker.say(f"stopped by {stop.reason}")
@@ -61,12 +76,19 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     return outcome
 
 
-def _loop(session: HilSession, link: Link, most_steps: int | None, stop: StopRequest) -> None:
+def _loop(
+    session: HilSession, link: Link, most_steps: int | None, stop: StopRequest, guided: Guided | None
+) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     while not stop and (most_steps is None or session.steps < most_steps):
-        received = link.receive(session.next_deadline())
+        deadline = session.next_deadline()
+        if guided is not None:
+            deadline = min(deadline, guided.next_deadline(time.monotonic()))
+        received = link.receive(deadline)
         now = time.monotonic()
         if received is not None:
             session.receive(received, now)
         for datagram in session.to_send(now):
             link.send(datagram)
+        if guided is not None:  # after the answer: the plant does not wait for ground control
+            guided.exchange(now, heard=received is not None)

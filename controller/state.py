@@ -17,6 +17,8 @@ LOAD_VELOCITY = slice(9, 12)
 BODY_RATES = slice(12, 15)
 EULER_ANGLES = slice(15, 18)
 STATE_SIZE = 18
+OWN_STATES = (0, 1, 2, 6, 7, 8, 12, 13, 14, 15, 16, 17)
+"""Indices of the states that are the vehicle's own, none of the load's."""
 
 WRENCH_SIZE = 4
 """Inputs u = [total thrust (N), moments about body x, y, z (N m)]."""

@@ -62,10 +62,10 @@ def control_step_us(vehicle: Vehicle) -> float:
     )
     estimate = np.zeros(18)
     estimate[2] = vehicle.hover_length
-    autopilot.step(estimate)
+    autopilot.step(estimate, 0, 0.0)
     began = time.perf_counter()
     for _ in range(STEPS):
-        autopilot.step(estimate)
+        autopilot.step(estimate, 0, 0.0)
     return (time.perf_counter() - began) / STEPS * 1e6
 
 

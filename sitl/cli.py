@@ -8,6 +8,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, preset_names, vehicle_names
 
 if TYPE_CHECKING:
+    from controller.ground_link import GroundOptions, Ports
     from sitl.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
     from sitl_bridge.plant.faults import Faults
@@ -93,7 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     fly.add_argument("scenario", metavar="SCENARIO", help="a scenario's name (see below) or .toml file")
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
-    for add in (_vehicle, _link, _clock, _loop, _control, _run, _output):
+    for add in (_vehicle, _link, _clock, _loop, _control, _run, _ground, _output):
         add(fly)
     fly.add_argument(
         "--plant-set",
@@ -124,7 +126,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="fly the vehicle",
         description="Be the autopilot: answer the plant's ticks with rotor commands.",
     )
-    for add in (_scenario, _vehicle, _link, _loop, _control, _run, _supervised):
+    for add in (_scenario, _vehicle, _link, _loop, _control, _run, _ground, _supervised):
         add(controller)
     controller.add_argument(
         "--json", action="store_true", help="one JSON object on standard output at the end"
@@ -267,6 +269,60 @@ def _control(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _ports(text: str) -> Ports:
+    """An argument type: LOCAL:PEER."""
+    from controller.ground_link import Ports
+
+    local, colon, peer = text.partition(":")
+    numbers = [int(part) for part in (local, peer) if part.isdigit() and 0 < int(part) < 65536]
+    if not colon or len(numbers) != 2:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected two UDP ports LOCAL:PEER, as in 18570:14550")
+    return Ports(*numbers)
+
+
+def _ground(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("ground control", "with a scenario that leaves the flight to it (hold)")
+    for flag, whom, local, peer in (
+        ("--gcs", "ground stations", "18570+N", "14550"),
+        ("--onboard", "MAVSDK and companion computers", "14580+N", "14540+N"),
+    ):
+        group.add_argument(
+            flag,
+            metavar="LOCAL:PEER",
+            type=_ports,
+            help=f"UDP ports of the link for {whom}: its own, and whom it speaks to first "
+            f"(default: {local}:{peer})",
+        )
+    group.add_argument(
+        "--signing-key",
+        metavar="FILE",
+        type=Path,
+        help="take and send only MAVLink 2 signed with this key (64 hexadecimal digits)",
+    )
+    group.add_argument(
+        "--parameters", metavar="FILE", type=Path, help="where parameters are kept when they are stored"
+    )
+    group.add_argument(
+        "--expose",
+        action="store_true",
+        help="open the links to the network, not to this machine alone; better with a key",
+    )
+
+
+def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
+    from controller.ground.signing import KeyFileError, read_key
+    from controller.ground_link import GroundOptions
+
+    if arguments.signing_key is not None:
+        try:
+            read_key(arguments.signing_key)
+        except KeyFileError as error:
+            raise DescriptionError("--signing-key", [str(error)]) from None
+    return GroundOptions(
+        arguments.gcs, arguments.onboard, arguments.signing_key, arguments.parameters, arguments.expose
+    )
+
+
 def _run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
@@ -358,7 +414,7 @@ def _plant(arguments: argparse.Namespace) -> int:
 def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
-    from sitl.scenario import Hover
+    from sitl.scenario import GroundControl, Hover
 
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
@@ -369,11 +425,12 @@ def _controller(arguments: argparse.Namespace) -> int:
         hil=_hil_address(arguments, "udpin"),
         design=arguments.design,
         rate_hz=arguments.rate,
-        path_from=reference.path,
+        path_from=None if isinstance(reference, GroundControl) else reference.path,
         instance=arguments.instance,
         duration_s=arguments.duration,
         drop_percent=arguments.drop,
         seed=arguments.seed,
+        ground=_ground_options(arguments),
     )
     outcome = run(options, speaker, stop)
     if arguments.json:
@@ -383,14 +440,16 @@ def _controller(arguments: argparse.Namespace) -> int:
 
 def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flight import FlightOptions, fly
+    from sitl.hold import ground_arguments, hold
     from sitl.report import table
-    from sitl.scenario import load_scenario
+    from sitl.scenario import GroundControl, load_scenario
 
     if arguments.speed is not None and arguments.clock != "lockstep":
         raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
+    scenario = load_scenario(arguments.scenario)
     options = FlightOptions(
         scenario_name=arguments.scenario,
-        scenario=load_scenario(arguments.scenario),
+        scenario=scenario,
         vehicle=arguments.vehicle,
         overrides=_overrides(arguments),
         plant_overrides=arguments.plant_set,
@@ -410,11 +469,18 @@ def _fly(arguments: argparse.Namespace) -> int:
     )
     stop = StopRequest()
     stop.install()
+    if isinstance(scenario.reference, GroundControl):
+        options = replace(options, out=arguments.out, ground=ground_arguments(_ground_options(arguments)))
+        failure = hold(options, stop)
+        if failure:
+            print(f"fly: {failure}", file=sys.stderr, flush=True)
+        return EXIT_FAILED if failure else 0
     summary = fly(options, stop)
     if arguments.json:
         print(json.dumps(summary, indent=2))
     else:
         print(table(summary))
+        assert options.out is not None
         for name in sorted(options.out.iterdir()):
             print(f"  {name}")
     if stop:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.scenario import Scenario, scenario_vehicle
+from sitl.scenario import GroundControl, Scenario, scenario_vehicle
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
@@ -39,7 +39,9 @@ class FlightOptions:
     duration_s: float | None
     drop_percent: float
     instance: int
-    out: Path
+    out: Path | None
+    ground: Sequence[str] = ()
+    """Arguments of the controller for its ground-control links."""
 
     def command_lines(self) -> tuple[list[str], list[str]]:
         """Arguments of `sitl plant` and of `sitl controller`."""
@@ -56,10 +58,12 @@ class FlightOptions:
             plant += ["--speed", repr(self.speed)]
         if self.duration_s is not None:
             plant += ["--duration", repr(self.duration_s)]
-        plant += ["--drop", repr(self.drop_percent), "--out", str(self.out)]
+        plant += ["--drop", repr(self.drop_percent)]
+        if self.out is not None:
+            plant += ["--out", str(self.out)]
         other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
         controller = [*common, "--hil", str(other_end), "--design", self.design, "--feedback", self.feedback]
-        return plant, controller
+        return plant, [*controller, *self.ground]
 
 
 def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
@@ -68,7 +72,10 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
     vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
     flown = scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
     checked(scenario.faults, flown)
+    assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)
+    assert not isinstance(scenario.reference, GroundControl)  # see `sitl.hold`
+    path_from = scenario.reference.path
     line = ProgressLine(sys.stderr)
     start = vehicle.initial.load_position
     reference: list[Any] = []  # made at the first progress event: it needs the autopilot's imports
@@ -79,7 +86,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         from sitl.metrics import reference_positions
 
         if not reference:
-            reference.append(scenario.reference.path(start))
+            reference.append(path_from(start))
         load = np.array(event["load_m"])
         target = reference_positions(reference[0], np.array([event["time_s"]]))[0]
         x, y, z = event["load_m"]
@@ -108,5 +115,5 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         "first_command_unix_s": outcome.first_command_unix_s,
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
-    path = scenario.reference.path(start)
+    path = path_from(start)
     return write_report(options.out, facts, path)

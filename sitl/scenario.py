@@ -56,7 +56,13 @@ class Circle(Section):
         return circle(self.centre, self.radius, self.angular_rate, start)
 
 
-Reference = Annotated[Hover | Setpoint | Circle, Field(discriminator="kind")]
+class GroundControl(Section):
+    """Ground control says when to arm and where to go."""
+
+    kind: Literal["ground-control"]
+
+
+Reference = Annotated[Hover | Setpoint | Circle | GroundControl, Field(discriminator="kind")]
 
 
 class Scenario(Section):

@@ -34,7 +34,7 @@ _FENCE_ACTIONS = ((0, "none"), (1, "warn"), (2, "hold"), (3, "return"), (4, "ter
 _OFFBOARD_ACTIONS = ((3, "return"), (4, "land"), (5, "hold"), (6, "terminate"))
 _BATTERY_ACTIONS = ((0, "warn"), (2, "land when critical"), (3, "return when critical, land in emergency"))
 _HIL_ACTIONS = ((0, "go on when it is back"), (1, "hold when it is back"), (4, "terminate"))
-_WEIGHT = "Weight in the LQR's cost; the gains are designed again in flight. "
+_WEIGHT = "Factor on the default weight in the LQR's cost; the gains are designed again in flight. "
 
 TABLE: tuple[Parameter, ...] = (
     # Who the vehicle is. QGroundControl's pages read these.
@@ -87,16 +87,16 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("GF_MAX_HOR_DIST", 500.0, 0.0, 10000.0, "m", "Radius of the geofence around home; 0: none"),
     Parameter("GF_MAX_VER_DIST", 120.0, 0.0, 10000.0, "m", "Height of the geofence above home; 0: none"),
     Parameter("FD_FAIL_TILT", 70.0, 30.0, 180.0, "deg", "Tilt at which the flight has failed and is terminated; 180: never"),
-    # The law: weights of the load's integral LQR, in SI units, inputs in units of hover thrust and arm moment
-    Parameter("LQR_Q_VPOS", 1.0, 0.0, 1e6, "1/m^2", _WEIGHT + "Position of the vehicle"),
-    Parameter("LQR_Q_LPOS", 10.0, 0.0, 1e6, "1/m^2", _WEIGHT + "Position of the load"),
-    Parameter("LQR_Q_VVEL", 1.0, 0.0, 1e6, "s^2/m^2", _WEIGHT + "Velocity of the vehicle"),
-    Parameter("LQR_Q_LVEL", 1.0, 0.0, 1e6, "s^2/m^2", _WEIGHT + "Velocity of the load"),
-    Parameter("LQR_Q_RATE", 1.0, 0.0, 1e6, "s^2/rad^2", _WEIGHT + "Body rates"),
-    Parameter("LQR_Q_ATT", 1.0, 0.0, 1e6, "1/rad^2", _WEIGHT + "Attitude"),
-    Parameter("LQR_Q_INT", 1.0, 0.0, 1e6, "1/(m s)^2", _WEIGHT + "Integral of the load's position error"),
-    Parameter("LQR_R_THRUST", 1.0, 1e-6, 1e6, "", _WEIGHT + "Thrust"),
-    Parameter("LQR_R_MOMENT", 1.0, 1e-6, 1e6, "", _WEIGHT + "Moments"),
+    # The law: factors on the weights of the integral LQR, controller/designs.py
+    Parameter("LQR_Q_VPOS", 1.0, 1e-3, 1e3, "", _WEIGHT + "Position of the vehicle while it carries the load"),
+    Parameter("LQR_Q_LPOS", 1.0, 1e-3, 1e3, "", _WEIGHT + "Position of the load (of the vehicle, when it flies alone)"),
+    Parameter("LQR_Q_VVEL", 1.0, 1e-3, 1e3, "", _WEIGHT + "Velocity of the vehicle"),
+    Parameter("LQR_Q_LVEL", 1.0, 1e-3, 1e3, "", _WEIGHT + "Velocity of the load"),
+    Parameter("LQR_Q_RATE", 1.0, 1e-3, 1e3, "", _WEIGHT + "Body rates"),
+    Parameter("LQR_Q_ATT", 1.0, 1e-3, 1e3, "", _WEIGHT + "Attitude"),
+    Parameter("LQR_Q_INT", 1.0, 1e-3, 1e3, "", _WEIGHT + "Integral of the load's position error"),
+    Parameter("LQR_R_THRUST", 1.0, 1e-3, 1e3, "", _WEIGHT + "Thrust"),
+    Parameter("LQR_R_MOMENT", 1.0, 1e-3, 1e3, "", _WEIGHT + "Moments"),
 )  # fmt: skip
 
 BY_NAME: dict[str, Parameter] = {parameter.name: parameter for parameter in TABLE}

@@ -7,15 +7,15 @@ overtaken gets none.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
-import numpy as np
 from pymavlink.dialects.v20 import common
 
-from controller.autopilot import Autopilot
 from controller.hil.answers import AnswerWriter
 from controller.hil.ticks import TickReader
+from controller.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
-from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.mavlink.framing import Frame, Packer
 from sitl_bridge.mavlink.hil import ODOMETRY
 
 PLANT_TIMEOUT = 1.0
@@ -26,12 +26,29 @@ HIL_STATE_QUATERNION = common.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 PX4_STATE_INTERVAL_US = 5000  # what PX4 asks a simulator for on connecting
 
 
+class Pilot(Protocol):
+    """What flies: it has the rotor commands of the next answer ready after each step."""
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rotors turn."""
+
+    def step(self, estimate: Array, time_usec: int, now: float) -> None:
+        """One control step on an estimate (18,), eq. 31, of the tick of `time_usec`."""
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """Take anything else that the plant says."""
+
+    def disarm(self) -> None:
+        """Stop the rotors; the next step starts afresh."""
+
+
 class HilSession:
     """Answers the ticks of one plant; `receive(datagram, now)`, `to_send(now)`, `next_deadline()`."""
 
     def __init__(
         self,
-        autopilot: Autopilot,
+        autopilot: Pilot,
         writer: AnswerWriter,
         packer: Packer,
         instance: int,
@@ -68,6 +85,8 @@ class HilSession:
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the plant; the answer is in `to_send`."""
         tick = self._reader.read(datagram)
+        for frame in tick.others:
+            self._autopilot.hear(frame, now)
         if tick.time_usec is None:
             return
         if self._last_answer is None:
@@ -85,9 +104,10 @@ class HilSession:
 
     def _answer(self, time_usec: int, truth: bool, now: float) -> None:
         if truth:
-            if not self._autopilot.armed:
-                self._say("plant and truth are there: armed, flying")
-            self._autopilot.step(self._reader.estimate)
+            before = self._autopilot.armed
+            self._autopilot.step(self._reader.estimate, time_usec, now)
+            if self._autopilot.armed != before:
+                self._say("disarmed" if before else "plant and truth are there: armed, flying")
             self.steps += 1
         else:
             self._autopilot.disarm()
@@ -131,7 +151,7 @@ class HilSession:
 
 
 def new_session(
-    make_autopilot: Callable[[np.ndarray], Autopilot], instance: int, say: Callable[[str], None]
+    make_autopilot: Callable[[Array], Pilot], instance: int, say: Callable[[str], None]
 ) -> HilSession:
     """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,)."""
     packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)

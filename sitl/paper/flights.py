@@ -15,7 +15,7 @@ from sitl.flight import FlightOptions
 from sitl.fly import Pair, watch
 from sitl.metrics import reference_positions
 from sitl.report import positions, read_state_log
-from sitl.scenario import load_scenario, scenario_vehicle
+from sitl.scenario import GroundControl, load_scenario, scenario_vehicle
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.plant.statelog import FILE_NAME
 from sitl_bridge.process import StopRequest
@@ -139,6 +139,7 @@ class Pilot:
             raise FlightError(f"{request.command}: {outcome.failure or 'the flight was not completed'}")
         log = read_state_log(out / FILE_NAME)
         vehicle = scenario_vehicle(description, None, [*request.overrides, *request.plant_overrides])
+        assert not isinstance(description.reference, GroundControl)  # the paper flies references only
         path = description.reference.path(vehicle.initial.load_position)
         return Flight(
             command=request.command,

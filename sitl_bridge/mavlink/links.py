@@ -123,7 +123,7 @@ class UdpLink:
                 self._set_timeout(wait)
                 flags = 0
             else:
-                flags = socket.MSG_DONTWAIT
+                flags = int(socket.MSG_DONTWAIT)
             datagram, sender = self._socket.recvfrom(LARGEST_DATAGRAM, flags)
         except OSError:  # nothing came, or an earlier datagram could not be delivered
             return None

@@ -37,7 +37,9 @@ def flat(vehicle: Vehicle, path: Path, t: float, lead: float = 0.0) -> tuple[Arr
     state, wrench = np.full(STATE_SIZE, np.nan), np.full(WRENCH_SIZE, np.nan)
     record = np.array([body(vehicle)], dtype=body(vehicle).dtype)
     scratch = attributes(np.zeros(1, dtype=STENCIL))
-    flat_motion(attributes(record), attributes(path), t, lead, scratch, state, wrench)
+    yaw = float(path["yaw"][0])
+    heading = np.array([np.cos(yaw), np.sin(yaw)])
+    flat_motion(attributes(record), attributes(path), t, lead, heading, scratch, state, wrench)
     return state, wrench
 
 

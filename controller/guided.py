@@ -1,0 +1,236 @@
+"""The autopilot under ground control: the station decides when to arm and where to go. No I/O.
+
+Two laws fly it: one for the vehicle on a slack cable, one for the load once that hangs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from controller.allocation import allocation
+from controller.designs import EVEN, Emphasis, guided_designs
+from controller.ground.station import Station
+from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Terminate
+from controller.ground.verdict import INFO, WARNING, Notice
+from controller.ground.view import VehicleView
+from controller.law import WORK, Design, Memory, engaged_memory
+from controller.state import (
+    EULER_ANGLES,
+    LOAD_POSITION,
+    LOAD_VELOCITY,
+    VEHICLE_POSITION,
+    VEHICLE_VELOCITY,
+    Array,
+)
+from controller.step import control_step
+from controller.trajectory import Limits, Trajectory
+from sitl_bridge.frames import Triple, quaternion_from_euler
+from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.vehicle import Vehicle
+
+IDLE_COMMAND = 0.08
+"""Rotors of a vehicle that is armed on the ground, as a share of their largest speed."""
+CONTACT_MARGIN = 0.02
+"""m, above rest, up to which a body counts as on the ground."""
+LIFTED = 0.05
+"""m, above rest, from which on the load counts as lifted, and its law takes over."""
+REACH = 0.3
+"""m, beyond a hanging load's distance, to which the vehicle pulls to lift the load off."""
+PICK_UP_SPEED = 0.4
+"""m/s, largest, at which it does."""
+
+
+WEIGHTS = {
+    "LQR_Q_VPOS": "vehicle_position",
+    "LQR_Q_LPOS": "load_position",
+    "LQR_Q_VVEL": "vehicle_velocity",
+    "LQR_Q_LVEL": "load_velocity",
+    "LQR_Q_RATE": "body_rates",
+    "LQR_Q_ATT": "attitude",
+    "LQR_Q_INT": "integral",
+    "LQR_R_THRUST": "thrust",
+    "LQR_R_MOMENT": "moments",
+}
+"""Parameters that weigh the designs, and what of `Emphasis` they are."""
+
+
+class Redesigner(Protocol):
+    """Makes designs in the background."""
+
+    def request(self, emphasis: Emphasis) -> None:
+        """Begin to design; what was under way is given up."""
+
+    def result(self) -> tuple[Design, Design] | str | None:
+        """The designs of the last request, once, when they are there; or why there are none."""
+
+
+class GuidedAutopilot:
+    """Station, trajectory and laws of one vehicle; `controls` (16,) are its rotor commands, 0..1."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        station: Station,
+        redesigner: Redesigner,
+        controls: Array,
+    ) -> None:
+        self.station = station
+        self._vehicle = vehicle
+        self._period = 1.0 / rate_hz
+        self._redesigner = redesigner
+        self._controls = controls
+        self._allocation = allocation(vehicle)
+        self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
+        self._trajectory = Trajectory(self._period)
+        self._work = np.zeros(1, dtype=WORK)
+        self._estimate = np.zeros(18)
+        self._law: Body | None = None
+        """The law that flies; None on the ground"""
+        self._memory: Memory = engaged_memory(np.zeros(3))
+        self._step: Callable[[], int] = self._bound(Body.VEHICLE)  # compiled code is loaded now
+        ground = vehicle.ground
+        self._vehicle_rest = self._load_rest = -math.inf
+        if ground is not None:
+            self._vehicle_rest = ground.height - min(leg[2] for leg in vehicle.airframe.legs)
+            self._load_rest = ground.height + vehicle.load.radius
+        self._pulling: tuple[Target, Goto] | None = None
+        """A target for the load, and what the vehicle does for it while the load lies"""
+        self._view: VehicleView | None = None
+        self._heard = -math.inf
+
+    @property
+    def armed(self) -> bool:
+        """Whether the rotors turn."""
+        return self.station.armed
+
+    def disarm(self) -> None:
+        """The plant has started again, or says no more where the vehicle is."""
+        if self.station.machine.armed:
+            self.station.machine.disarm(force=True)
+        self._law = None
+        self._view = None
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """Anything else from the plant: the load speaks for itself."""
+        self.station.relay(frame, now)
+
+    def wait(self, now: float) -> None:
+        """No tick has come: the failsafes go on."""
+        if self._view is not None:
+            self._view.hil_age = now - self._heard
+            self.station.update(self._view, now)
+
+    def step(self, estimate: Array, time_usec: int, now: float) -> None:
+        """One control step on an estimate (18,), eq. 31."""
+        self._estimate[:] = estimate
+        self._heard = now
+        view, first = self._seen(estimate, time_usec)
+        if first and not view.vehicle_on_ground and any((*view.velocity, *view.load_velocity)):
+            self.station.machine.resume(view, now)  # held by the plant it would be at rest
+        target = self.station.update(view, now)
+        self._take_designs()
+        self._fly(target, estimate, view)
+
+    def _seen(self, estimate: Array, time_usec: int) -> tuple[VehicleView, bool]:
+        """The view of an estimate, and whether it is the first."""
+        x = estimate.tolist()
+        attitude = quaternion_from_euler((x[15], x[16], x[17]))
+        position, load = (x[0], x[1], x[2]), (x[3], x[4], x[5])
+        first = self._view is None
+        if self._view is None:
+            self._view = VehicleView(0.0, position, position, attitude, position, load, load)
+        view = self._view
+        view.time = time_usec * 1e-6
+        view.position, view.load_position = position, load
+        view.velocity, view.load_velocity = (x[6], x[7], x[8]), (x[9], x[10], x[11])
+        view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
+        view.cable_taut = math.dist(position, load) >= self._vehicle.cable.rest_length
+        view.vehicle_on_ground = position[2] < self._vehicle_rest + CONTACT_MARGIN
+        view.load_on_ground = load[2] < self._load_rest + CONTACT_MARGIN
+        view.hil_age = 0.0
+        view.throttle = float(self._controls[: len(self._vehicle.rotors)].mean()) if self.armed else 0.0
+        return view, first
+
+    def _fly(self, target: Target, estimate: Array, view: VehicleView) -> None:
+        if isinstance(target, Idle | Terminate):
+            self._law = None
+            self._controls[: len(self._vehicle.rotors)] = IDLE_COMMAND
+            return
+        body = self._body_for(target, view)
+        if body is not self._law:
+            self._engage(body, estimate)
+        if body is not target.body:
+            target = self._pull(target, view)
+        self._trajectory.advance(target, self._limits(), float(self._memory["ticks"][0]) * self._period)
+        self._step()
+
+    def _body_for(self, target: Goto | Follow | Land, view: VehicleView) -> Body:
+        """Which law is to fly: the load's when the load hangs, and for as long as it is asked for."""
+        if target.body is Body.VEHICLE or self._law is Body.LOAD:
+            return target.body
+        lifted = view.cable_taut and view.load_position[2] > self._load_rest + LIFTED
+        return Body.LOAD if lifted else Body.VEHICLE
+
+    def _pull(self, target: Goto | Follow | Land, view: VehicleView) -> Goto:
+        """The vehicle alone rises above a load that lies, until it hangs."""
+        if self._pulling is None or self._pulling[0] is not target:
+            x, y, z = view.load_position
+            above: Triple = (x, y, z + self._vehicle.hover_length + REACH)
+            yaw = float(self._trajectory.path["yaw"][0]) if math.isnan(target.yaw) else target.yaw
+            goto = Goto(Body.VEHICLE, above, yaw, PICK_UP_SPEED)
+            self._pulling = (target, goto)
+        return self._pulling[1]
+
+    def _engage(self, body: Body, estimate: Array) -> None:
+        """Hand over to a law: its reference starts with the body's motion, what the rotors give goes on."""
+        position, velocity = (
+            (LOAD_POSITION, LOAD_VELOCITY) if body is Body.LOAD else (VEHICLE_POSITION, VEHICLE_VELOCITY)
+        )
+        yaw = float(estimate[EULER_ANGLES][2] if self._law is None else self._trajectory.path["yaw"][0])
+        memory = engaged_memory(estimate[position])
+        before = self._memory if self._law is not None else None
+        self._trajectory.start(estimate[position], estimate[velocity], yaw)
+        if before is not None and self._law is not None:
+            # Deviations from u* of the law before, seen from the new law's u*.
+            change = self._designs[self._law]["hover_wrench"][0] - self._designs[body]["hover_wrench"][0]
+            memory["rotors"][0] = before["rotors"][0] + change
+            memory["past"][0] = before["past"][0] + change
+        self._law, self._memory = body, memory
+        self._step = self._bound(body)
+
+    def _bound(self, body: Body) -> Callable[[], int]:
+        return control_step.bind(
+            self._designs[body],
+            self._allocation,
+            self._trajectory.path,
+            self._memory,
+            self._work,
+            self._estimate,
+            self._controls,
+        )
+
+    def _limits(self) -> Limits:
+        p = self.station.parameters
+        return Limits(p["MPC_ACC_HOR"], p["MPC_XY_VEL_MAX"], p["MPC_Z_VEL_MAX_UP"], p["MPC_Z_VEL_MAX_DN"])
+
+    def _take_designs(self) -> None:
+        """New weights are designed for in the background; what is ready is taken between two ticks."""
+        changed = self.station.parameters.take_changed()
+        if changed & WEIGHTS.keys():
+            p = self.station.parameters
+            self._redesigner.request(EVEN._replace(**{field: p[name] for name, field in WEIGHTS.items()}))
+        result = self._redesigner.result()
+        if result is None:
+            return
+        if isinstance(result, str):
+            self.station.announce(Notice(WARNING, f"Weights not used: {result}"), self._heard)
+            return
+        self._designs = dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
+        self.station.announce(Notice(INFO, "New weights fly"), self._heard)
+        if self._law is not None:
+            self._step = self._bound(self._law)

@@ -1,0 +1,55 @@
+"""What a controller under ground control needs beside the HIL link, put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from controller.ground_link import GroundLink, GroundOptions
+from controller.guided import GuidedAutopilot
+from controller.redesign import DesignProcess
+from controller.state import Array
+from sitl_bridge.vehicle import Vehicle
+
+LONGEST_WAIT = 0.02
+"""s, between two looks at the sockets when the plant is silent"""
+
+
+class Guided:
+    """Ground-control link, background designer and autopilot of one vehicle."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        instance: int,
+        options: GroundOptions | None,
+        say: Callable[[str], None],
+    ) -> None:
+        """Raises OSError when a port is taken, KeyFileError for a key that is none."""
+        self._vehicle = vehicle
+        self._rate_hz = rate_hz
+        self._link = GroundLink(vehicle, instance, options or GroundOptions(), say)
+        self._designer = DesignProcess(vehicle, rate_hz)
+        self._pilot: GuidedAutopilot | None = None
+
+    def autopilot(self, controls: Array) -> GuidedAutopilot:
+        """The autopilot around its rotor commands (16,)."""
+        self._pilot = GuidedAutopilot(
+            self._vehicle, self._rate_hz, self._link.station, self._designer, controls
+        )
+        return self._pilot
+
+    def next_deadline(self, now: float) -> float:
+        """When ground control wants attention, if the plant says nothing before."""
+        return min(self._link.station.next_deadline(now), now + LONGEST_WAIT)
+
+    def exchange(self, now: float, heard: bool) -> None:
+        """Serve ground control; `heard`: whether the plant has said something since the last time."""
+        if not heard and self._pilot is not None:
+            self._pilot.wait(now)
+        self._link.exchange(now)
+
+    def close(self) -> None:
+        """Free the ports, give up what is under way."""
+        self._link.close()
+        self._designer.close()
