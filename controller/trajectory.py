@@ -25,10 +25,10 @@ APPROACH = 1.5
 """1/s, with which the carrot's last bit of way decays"""
 BRAKING_SHARE = 0.7
 """Of the acceleration limit, that an approach to a point is planned with"""
-YAW_RATE = 0.8
+YAW_RATE = 0.6
 """rad/s, largest"""
-YAW_APPROACH = 2.0
-"""1/s"""
+YAW_ACCELERATION = 0.5
+"""rad/s²: yaw is what rotors are worst at"""
 
 
 class Limits(NamedTuple):
@@ -155,10 +155,12 @@ class Trajectory:
         rate = 0.0
         if not math.isnan(target.yaw):
             away = math.remainder(target.yaw - yaw, 2.0 * math.pi)
-            rate = YAW_APPROACH * away
+            rate = math.copysign(_approach(abs(away), BRAKING_SHARE * YAW_ACCELERATION), away)
         elif isinstance(target, Follow) and not math.isnan(target.yaw_rate):
             rate = target.yaw_rate
         rate = max(-YAW_RATE, min(YAW_RATE, rate))
+        before, step = float(self.path["yaw_rate"][0]), YAW_ACCELERATION * self._period
+        rate = max(before - step, min(before + step, rate))
         self.path["yaw"] = math.remainder(yaw + rate * self._period, 2.0 * math.pi)
         self.path["yaw_rate"] = rate
 
