@@ -1,7 +1,7 @@
 """Let the load fly a figure eight with pymavlink: python examples/load_figure_eight.py [udpin:…]
 
-The load has a MAVLink system of its own, 100 above the vehicle's: set-points that are addressed to it say where
-the load is to be. Position, velocity and acceleration together make it follow without a lag.
+The load has a MAVLink system of its own, 100 above the vehicle's: set-points that are addressed to it say
+where the load is to be. Position, velocity and acceleration together make it follow without a lag.
 """
 
 import math

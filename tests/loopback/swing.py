@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -47,10 +48,10 @@ def swing(flown: Flown) -> Array:
 def overshoots(positions: Array, corners: Array) -> Array:
     """How far each corner (n, 3) is passed in the direction of the leg that leads to it, m (n - 1,).
 
-    A corner's part of the flight ends where the position is nearest to the corner after it.
+    A leg's part of the flight begins where the position was nearest to the corner before.
     """
     found, begin = [], 0
-    for before, corner in zip(corners[:-1], corners[1:], strict=True):
+    for before, corner in pairwise(corners):
         leg = (corner - before) / np.linalg.norm(corner - before)
         found.append(float(np.max((positions[begin:] - corner) @ leg)))
         begin += int(np.argmin(np.linalg.norm(positions[begin:] - corner, axis=1)))
