@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-import numpy as np
 from pymavlink.dialects.v20 import common
 
 from controller.hil.answers import AnswerWriter
@@ -104,7 +103,7 @@ class HilSession:
         self._last_heard = now
 
     def _answer(self, time_usec: int, truth: bool, now: float) -> None:
-        if truth and np.isfinite(self._reader.estimate).all():
+        if truth:
             before = self._autopilot.armed
             self._autopilot.step(self._reader.estimate, time_usec, now)
             if self._autopilot.armed != before:

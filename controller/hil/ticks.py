@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,10 +26,11 @@ from sitl_bridge.mavlink.framing import (
     read_payload,
     scan,
 )
-from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, ODOMETRY
+from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, ODOMETRY
 
 INCOMING = np.dtype([("sensor", HIL_SENSOR.dtype), ("vehicle", ODOMETRY.dtype), ("load", ODOMETRY.dtype)])
 _SENSOR_ID, _GPS_ID, _ODOMETRY_ID = HIL_SENSOR.message_id, HIL_GPS.message_id, ODOMETRY.message_id
+_STATE_ID = HIL_STATE_QUATERNION.message_id
 _SENSOR_SIZE, _ODOMETRY_SIZE = HIL_SENSOR.dtype.itemsize, ODOMETRY.dtype.itemsize
 
 # What `read_tick` found, as bits.
@@ -75,7 +77,8 @@ def read_tick(
 ) -> int:
     """Read data[:length]; returns bits of what was found.
 
-    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written.
+    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written;
+    truth that is not finite is none.
     """
     count = scan(data, table, length)
     header[0] = count
@@ -92,12 +95,15 @@ def read_tick(
         elif message_id == _ODOMETRY_ID and system == load_sys and component == COMPONENT_LOAD:
             read_payload(data, table[i], payloads[_SENSOR_SIZE + _ODOMETRY_SIZE :])
             found |= LOAD_TRUTH
-        elif message_id != _GPS_ID:
+        elif message_id != _GPS_ID and message_id != _STATE_ID:
             found |= OTHERS
     if found & TICK:
         header[1] = records[0].sensor.time_usec
     if found & VEHICLE_TRUTH and found & LOAD_TRUTH:
         estimate_from_truth(records[0].vehicle, records[0].load, estimate)
+        for i in range(STATE_SIZE):
+            if not math.isfinite(estimate[i]):
+                found &= ~VEHICLE_TRUTH
     return found
 
 
@@ -134,7 +140,7 @@ class TickReader:
         others: list[Frame] = []
         if found & OTHERS:
             rows = self._table[: self._header[0]].tolist()
-            known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID)
+            known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID, _STATE_ID)
             others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] not in known]
         truth = bool(found & VEHICLE_TRUTH and found & LOAD_TRUTH)
         return Tick(int(self._header[1]) if found & TICK else None, truth, others)

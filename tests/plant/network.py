@@ -95,13 +95,15 @@ def paper() -> Vehicle:
     return load_vehicle("paper", ["disturbance.force_std=5"])
 
 
-def autopilot_session(vehicle: Vehicle, rate_hz: float = 250.0) -> HilSession:
+def autopilot_session(
+    vehicle: Vehicle, rate_hz: float = 250.0, say: Callable[[str], None] = lambda text: None
+) -> HilSession:
     return new_session(
         lambda controls: Autopilot(
             vehicle, "default", rate_hz, lambda start: setpoint((1.0, 2.0, 1.0), start), controls
         ),
         0,
-        lambda text: None,
+        say,
     )
 
 
