@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
+from pymavlink.dialects.v20 import common
 
 from controller.allocation import allocation
 from controller.designs import EVEN, Emphasis, guided_designs
@@ -29,7 +30,7 @@ from controller.state import (
 from controller.step import control_step
 from controller.trajectory import Limits, Trajectory
 from sitl_bridge.frames import Triple, quaternion_from_euler
-from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.mavlink.framing import Frame, decode
 from sitl_bridge.vehicle import Vehicle
 
 IDLE_COMMAND = 0.08
@@ -56,6 +57,9 @@ WEIGHTS = {
     "LQR_R_MOMENT": "moments",
 }
 """Parameters that weigh the designs, and what of `Emphasis` they are."""
+
+
+UNMEASURED_CELL = 0xFFFF
 
 
 class Redesigner(Protocol):
@@ -116,8 +120,15 @@ class GuidedAutopilot:
         self._view = None
 
     def hear(self, frame: Frame, now: float) -> None:
-        """Anything else from the plant: the load speaks for itself."""
+        """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.relay(frame, now)
+        if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
+            battery = decode(frame)
+            measured = [volts for volts in battery.voltages if volts != UNMEASURED_CELL]
+            self._view.battery_voltage = sum(measured) * 1e-3 if measured else math.nan
+            current, remaining = battery.current_battery, battery.battery_remaining
+            self._view.battery_current = current * 1e-2 if current >= 0 else math.nan
+            self._view.battery_remaining = remaining * 1e-2 if remaining >= 0 else math.nan
 
     def wait(self, now: float) -> None:
         """No tick has come: the failsafes go on."""

@@ -21,7 +21,7 @@ class DesignProcess:
     """Makes the designs of one vehicle in the background."""
 
     def __init__(self, vehicle: Vehicle, rate_hz: float) -> None:
-        self._vehicle = vehicle.model_dump(mode="json")
+        self._vehicle = vehicle.model_dump_json()
         self._rate_hz = rate_hz
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -70,7 +70,7 @@ def main() -> None:
     """Read what is asked for, write two records of `law.DESIGN`."""
     os.nice(10)
     asked = json.load(sys.stdin)
-    vehicle = Vehicle.model_validate(asked["vehicle"])
+    vehicle = Vehicle.model_validate_json(asked["vehicle"])
     loaded, alone = guided_designs(vehicle, asked["rate_hz"], Emphasis(*asked["emphasis"]))
     sys.stdout.buffer.write(loaded.tobytes() + alone.tobytes())
 

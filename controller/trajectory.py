@@ -19,16 +19,16 @@ from controller.reference import DERIVATIVES, Path, local_path
 from controller.state import Array
 from sitl_bridge.frames import Triple
 
-POLE = 4.0
+POLE = 6.0
 """1/s, of the reference model; five of them: it settles in some 2 s"""
 APPROACH = 1.5
 """1/s, with which the carrot's last bit of way decays"""
 BRAKING_SHARE = 0.7
 """Of the acceleration limit, that an approach to a point is planned with"""
-YAW_RATE = 0.8
+YAW_RATE = 0.6
 """rad/s, largest"""
-YAW_APPROACH = 2.0
-"""1/s"""
+YAW_ACCELERATION = 0.5
+"""rad/s²: yaw is what rotors are worst at"""
 
 
 class Limits(NamedTuple):
@@ -44,21 +44,33 @@ class Limits(NamedTuple):
     """m/s"""
 
 
-def _model(period: float) -> tuple[Array, Array, Array]:
-    """Of the reference model: transition of motion (5, 5) and from the carrot (5, 3), and feedback (5,).
+class _Model:
+    """The reference model: r(5) = -sum of a_k·r(k) + sum of b_k·c(k), (s + POLE)^5 = s^5 + a_4 s^4 + … + a_0.
 
-    r(5) = -sum of a_k·(r(k) - c(k)), (s + POLE)^5 = s^5 + a_4 s^4 + … + a_0, with the carrot's position,
-    velocity and acceleration moving as a parabola within a period.
+    c is the carrot, that moves as a parabola within a period. With b_0 alone the motion is the carrot seen
+    through a positive window: it lags 5 / POLE, and keeps every limit that the carrot keeps. With b_k = a_k
+    up to the acceleration it follows a moving set-point without a lag.
     """
-    order = DERIVATIVES
-    feedback = np.array([math.comb(order, k) * POLE ** (order - k) for k in range(order)])
-    a = np.zeros((order + 3, order + 3))
-    a[: order - 1, 1:order] = np.eye(order - 1)
-    a[order - 1, :order] = -feedback
-    a[order - 1, order:] = feedback[:3]
-    a[order, order + 1] = a[order + 1, order + 2] = 1.0
-    transition = linalg.expm(a * period)
-    return transition[:order, :order], transition[:order, order:], feedback
+
+    def __init__(self, period: float, ahead: bool) -> None:
+        order = DERIVATIVES
+        self._feedback = np.array([math.comb(order, k) * POLE ** (order - k) for k in range(order)])
+        self._forward = self._feedback[:3] * (1.0, ahead, ahead)
+        a = np.zeros((order + 3, order + 3))
+        a[: order - 1, 1:order] = np.eye(order - 1)
+        a[order - 1, :order] = -self._feedback
+        a[order - 1, order:] = self._forward
+        a[order, order + 1] = a[order + 1, order + 2] = 1.0
+        transition = linalg.expm(a * period)
+        self._own, self._pull = transition[:order, :order], transition[:order, order:]
+
+    def advance(self, motion: Array, before: Array, after: Array) -> None:
+        """Motion (6, 3) a period later, the carrot (3, 3) having gone from one state to another.
+
+        before: with the acceleration of the period.
+        """
+        motion[:DERIVATIVES] = self._own @ motion[:DERIVATIVES] + self._pull @ before
+        motion[DERIVATIVES] = self._forward @ after - self._feedback @ motion[:DERIVATIVES]
 
 
 def _approach(away: float, acceleration: float) -> float:
@@ -76,7 +88,7 @@ class Trajectory:
         self.path: Path = local_path()
         self._period = period
         self._motion: Array = self.path["motion"][0]
-        self._own, self._pull, self._feedback = _model(period)
+        self._smooth, self._ahead = _Model(period, ahead=False), _Model(period, ahead=True)
         self._carrot = np.zeros((3, 3))
         """Position, velocity, acceleration of the carrot"""
         self._age = 0.0
@@ -95,12 +107,11 @@ class Trajectory:
         """Go on by one period towards a target; `time` (s) is that of the law's step to come."""
         if target is not self._target:
             self._target, self._age = target, 0.0
+        before = self._carrot.copy()
         self._move_carrot(target, limits)
-        motion = self._own @ self._motion[:DERIVATIVES] + self._pull @ self._carrot
-        self._motion[:DERIVATIVES] = motion
-        away = motion.copy()
-        away[:3] -= self._carrot
-        self._motion[DERIVATIVES] = -self._feedback @ away
+        before[2] = self._carrot[2]
+        model = self._ahead if _moves(target) else self._smooth
+        model.advance(self._motion, before, self._carrot)
         self._turn(target)
         self.path["epoch"] = time
         self._age += self._period
@@ -155,12 +166,21 @@ class Trajectory:
         rate = 0.0
         if not math.isnan(target.yaw):
             away = math.remainder(target.yaw - yaw, 2.0 * math.pi)
-            rate = YAW_APPROACH * away
+            rate = math.copysign(_approach(abs(away), BRAKING_SHARE * YAW_ACCELERATION), away)
         elif isinstance(target, Follow) and not math.isnan(target.yaw_rate):
             rate = target.yaw_rate
         rate = max(-YAW_RATE, min(YAW_RATE, rate))
+        before, step = float(self.path["yaw_rate"][0]), YAW_ACCELERATION * self._period
+        rate = max(before - step, min(before + step, rate))
         self.path["yaw"] = math.remainder(yaw + rate * self._period, 2.0 * math.pi)
         self.path["yaw_rate"] = rate
+
+
+def _moves(target: Goto | Land | Follow) -> bool:
+    """Whether a target is a trajectory: a position with its velocity."""
+    return isinstance(target, Follow) and any(
+        math.isfinite(p) and math.isfinite(v) for p, v in zip(target.position, target.velocity, strict=True)
+    )
 
 
 def _towards(way: Triple, speed: float, braking: float) -> Triple:

@@ -1,0 +1,94 @@
+"""A vehicle for your own tests: `with flying_vehicle(folder) as vehicle: … connect to vehicle.mavsdk …`.
+
+Two real processes on free ports of 127.0.0.1, on the ground and disarmed. As a pytest plugin (installed with
+the package) this is the fixture `sitl_vehicle`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+START_PATIENCE = 120.0
+"""s; the first start on a machine compiles"""
+STOP_PATIENCE = 20.0
+
+
+@dataclass(frozen=True)
+class SimulatedVehicle:
+    """Where to reach it, and what it leaves."""
+
+    mavsdk: str
+    """Connection string for MAVSDK"""
+    mavproxy: str
+    """`--master` of MAVProxy, and connection string of pymavlink"""
+    state_log: Path
+    """The simulated truth, a Parquet file; complete when the vehicle is gone"""
+    log: Path
+    """What the processes said"""
+
+
+def _free_ports(count: int) -> list[int]:
+    with contextlib.ExitStack() as stack:
+        sockets = [
+            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
+        ]
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [each.getsockname()[1] for each in sockets]
+
+
+@contextlib.contextmanager
+def flying_vehicle(
+    folder: Path,
+    arguments: Sequence[str] = ("--clock", "lockstep", "--speed", "1"),
+    parameters: Mapping[str, float] | None = None,
+    scenario: str = "hold",
+) -> Iterator[SimulatedVehicle]:
+    """Start a vehicle that waits for ground control; it is gone on leaving.
+
+    folder: for logs. arguments: of `sitl fly`; by default plant and controller wait for each other, so that
+    a busy machine makes the flight slower but not different. parameters: values to start with.
+    """
+    hil, gcs, gcs_peer, onboard, onboard_peer = _free_ports(5)
+    folder.mkdir(parents=True, exist_ok=True)
+    log = folder / "sitl.txt"
+    stored = folder / "parameters.json"
+    # A test's machine may be busy: a pause of the processes is no lost link.
+    stored.write_text(json.dumps({"COM_HIL_LOSS_T": 10.0, **(parameters or {})}))
+    command = [sys.executable, "-m", "sitl", "fly", scenario, *arguments]
+    command += ["--hil", f"udpout:127.0.0.1:{hil}", "--gcs", f"{gcs}:{gcs_peer}"]
+    command += ["--onboard", f"{onboard}:{onboard_peer}", "--parameters", str(stored), "--out", str(folder)]
+    with log.open("wb") as said:
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
+        try:
+            _wait_for(process, log, "plant connected")
+            yield SimulatedVehicle(
+                f"udpin://127.0.0.1:{onboard_peer}",
+                f"udpin:127.0.0.1:{gcs_peer}",
+                folder / "state.parquet",
+                log,
+            )
+        finally:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(STOP_PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def _wait_for(process: subprocess.Popen[bytes], log: Path, text: str) -> None:
+    deadline = time.monotonic() + START_PATIENCE
+    while text not in (said := log.read_text(errors="replace")):
+        if process.poll() is not None or time.monotonic() > deadline:
+            raise RuntimeError(f"the vehicle did not start:\n{said}")
+        time.sleep(0.05)

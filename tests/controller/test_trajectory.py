@@ -1,0 +1,128 @@
+"""Motions to the targets of ground control: smooth, within their limits, and where they ought to end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from controller.allocation import MOST_ROTORS, allocation
+from controller.designs import guided_designs
+from controller.ground.targets import Body, Follow, Goto, Land
+from controller.law import WORK, engaged_memory
+from controller.state import LOAD_POSITION, STATE_SIZE, Array
+from controller.step import control_step
+from controller.trajectory import Limits, Trajectory
+from tests.controller.fleet import FLEET
+
+PERIOD = 0.004
+LIMITS = Limits(acceleration=2.0, speed=6.0, up=2.0, down=1.5)
+NAN3 = (math.nan, math.nan, math.nan)
+
+
+def moved(trajectory: Trajectory, target: Goto | Land | Follow, duration: float) -> Array:
+    """The motion (n, 6, 3) that a target makes."""
+    rows = []
+    for k in range(round(duration / PERIOD)):
+        trajectory.advance(target, LIMITS, k * PERIOD)
+        rows.append(trajectory.path["motion"][0].copy())
+    return np.array(rows)
+
+
+def started(velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Trajectory:
+    trajectory = Trajectory(PERIOD)
+    trajectory.start(np.zeros(3), np.array(velocity), 0.0)
+    return trajectory
+
+
+@pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), (2.0, -1.0, 0.5)])
+def test_each_derivative_is_the_derivative_of_the_one_before(velocity: tuple[float, float, float]) -> None:
+    motion = moved(started(velocity), Goto(Body.LOAD, (5.0, 3.0, 1.0), 0.0, 2.0), 8.0)
+    for order in range(4):
+        change = (motion[2:, order] - motion[:-2, order]) / (2 * PERIOD)
+        scale = np.abs(motion[:, order + 1]).max()
+        np.testing.assert_allclose(motion[1:-1, order + 1], change, atol=0.01 * scale)
+    np.testing.assert_allclose(motion[0, 0], np.array(velocity) * PERIOD, atol=1e-4)
+
+
+def test_it_arrives_without_passing_the_point_and_keeps_the_limits() -> None:
+    motion = moved(started(), Goto(Body.LOAD, (10.0, 0.0, 0.0), 0.0, 3.0), 12.0)
+    np.testing.assert_allclose(motion[-1, 0], (10.0, 0.0, 0.0), atol=0.01)
+    assert motion[:, 0, 0].max() < 10.01
+    assert motion[:, 1, 0].max() < 3.0 * 1.02
+    assert np.abs(motion[:, 2, 0]).max() < 2.0 * 1.05
+    climb = moved(started(), Goto(Body.LOAD, (0.0, 0.0, 10.0), 0.0, 6.0), 5.0)
+    assert climb[:, 1, 2].max() == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_velocity_is_reached_and_kept_and_a_landing_has_no_end() -> None:
+    follow = Follow(Body.LOAD, NAN3, (1.5, 0.0, -0.5), NAN3, math.nan, math.nan)
+    np.testing.assert_allclose(moved(started(), follow, 5.0)[-1, 1], (1.5, 0.0, -0.5), atol=1e-3)
+    sinking = moved(started(), Land(Body.VEHICLE, (0.0, 0.0, 0.0), 0.0, 0.5), 10.0)
+    np.testing.assert_allclose(sinking[-1, 1], (0.0, 0.0, -0.5), atol=1e-3)
+    assert sinking[-1, 0, 2] < -4.0
+
+
+def test_a_trajectory_of_set_points_is_followed_without_lag() -> None:
+    """A circle of 2 m in 12 s, given at 20 Hz with velocity and acceleration."""
+    trajectory, w = started(), 2.0 * math.pi / 12.0
+    errors = []
+    for message in range(20 * 24):
+        t = message / 20.0
+        c, s = math.cos(w * t), math.sin(w * t)
+        follow = Follow(
+            Body.LOAD,
+            (2.0 * c, 2.0 * s, 0.0),
+            (-2.0 * w * s, 2.0 * w * c, 0.0),
+            (-2.0 * w * w * c, -2.0 * w * w * s, 0.0),
+            math.nan,
+            math.nan,
+        )
+        for _ in range(12 if message % 2 else 13):  # 12.5 ticks in the mean
+            trajectory.advance(follow, LIMITS, 0.0)
+        end = t + 0.05
+        place = trajectory.path["motion"][0, 0]
+        errors.append(math.hypot(place[0] - 2 * math.cos(w * end), place[1] - 2 * math.sin(w * end)))
+    assert max(errors[20 * 12 :]) < 0.03
+
+
+def test_yaw_turns_the_short_way_and_no_faster_than_it_may() -> None:
+    trajectory = started()
+    trajectory.start(np.zeros(3), np.zeros(3), 3.0)
+    rates = []
+    for k in range(1500):
+        trajectory.advance(Goto(Body.LOAD, (0.0, 0.0, 0.0), -3.0, 1.0), LIMITS, k * PERIOD)
+        rates.append(float(trajectory.path["yaw_rate"][0]))
+    assert float(trajectory.path["yaw"][0]) == pytest.approx(-3.0, abs=1e-3)
+    assert min(rates) > -0.01  # from 3 on over pi
+    assert max(rates) <= 0.6
+
+
+@pytest.mark.parametrize("law", [0, 1], ids=["load", "vehicle"])
+def test_a_law_that_looks_elsewhere_does_the_same(law: int) -> None:
+    """Everything turned about the vertical, heading and all: the rotors' commands are the same."""
+    vehicle = FLEET["small, lag"]
+    design = guided_designs(vehicle, 250.0)[law]
+    commands = []
+    for turn in (0.0, 1.1, -2.9):
+        c, s = math.cos(turn), math.sin(turn)
+        turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        trajectory = Trajectory(PERIOD)
+        trajectory.start(np.zeros(3), turned @ (1.0, 0.5, 0.1), turn)
+        estimate, controls = np.zeros(STATE_SIZE), np.zeros(MOST_ROTORS)
+        x = np.array([0.1, 0.2, vehicle.hover_length, 0.3, -0.1, 0.2, 0.5, 0.4, -0.1, 0.2, 0.3, 0.1])
+        for i in range(0, 12, 3):
+            estimate[i : i + 3] = turned @ x[i : i + 3]
+        estimate[12:18] = (0.1, -0.2, 0.05, 0.04, -0.03, turn + 0.02)
+        memory = engaged_memory(estimate[LOAD_POSITION])
+        step = control_step.bind(
+            design, allocation(vehicle), trajectory.path, memory, np.zeros(1, dtype=WORK), estimate, controls
+        )
+        goto = Goto(Body.LOAD, tuple((turned @ (2.0, 1.0, 0.0)).tolist()), turn, 2.0)
+        for k in range(250):
+            trajectory.advance(goto, LIMITS, k * PERIOD)
+            step()
+        commands.append(controls[:4].copy())
+    np.testing.assert_allclose(commands[1], commands[0], rtol=1e-6)
+    np.testing.assert_allclose(commands[2], commands[0], rtol=1e-6)

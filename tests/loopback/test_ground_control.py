@@ -1,0 +1,207 @@
+"""Real plant, real controller, real clients: MAVSDK-Python, MAVProxy and pymavlink fly it over UDP."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import common as mavlink
+
+from sitl.testing import SimulatedVehicle, flying_vehicle
+from tests.loopback import swing
+from tests.loopback.clients import Vehicle, mavsdk_vehicle, until
+from tests.loopback.flights import mavproxy_flight, mavsdk_flight, take_off
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+LANDED = 0.15
+"""m, height of an iris that stands on its legs, and some"""
+
+
+def assert_landed(vehicle: SimulatedVehicle) -> swing.Flown:
+    """The flight's log; at its end everything is on the ground, the vehicle not on its load."""
+    flown = swing.read(vehicle.state_log)
+    assert flown.vehicle[-1, 2] < LANDED
+    assert flown.load[-1, 2] < 0.06
+    assert np.linalg.norm(flown.vehicle[-1, :2] - flown.load[-1, :2]) > 0.3
+    return flown
+
+
+def test_mavsdk_flies_everything(tmp_path: Path) -> None:
+    with flying_vehicle(tmp_path) as vehicle:
+        asyncio.run(mavsdk_flight(vehicle.mavsdk))
+    flown = assert_landed(vehicle)
+    assert flown.vehicle[:, 2].max() > 4.5
+
+
+def test_mavproxy_flies_a_mission_and_lands(tmp_path: Path) -> None:
+    with flying_vehicle(tmp_path / "vehicle") as vehicle:
+        mavproxy_flight(vehicle.mavproxy.replace("udpin", "udp"), tmp_path)
+    assert_landed(vehicle)
+
+
+async def _square(connection: str, side: float, height: float) -> None:
+    from mavsdk.plugins.offboard import PositionNedYaw
+
+    async with mavsdk_vehicle(connection) as vehicle:
+        await take_off(vehicle, height)
+        await vehicle.telemetry.set_rate_position_velocity_ned(20.0)
+        corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)]
+        await vehicle.offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -height, 90.0))
+        await vehicle.offboard.start()
+        for north, east in corners:
+            await vehicle.offboard.set_position_ned(PositionNedYaw(north, east, -height, 90.0))
+            await _arrive(vehicle, (north, east, -height))
+        await vehicle.offboard.stop()
+        await vehicle.action.land()
+        await until(vehicle.telemetry.armed, lambda armed: not armed, 60, "landed")
+
+
+async def _arrive(vehicle: Vehicle, place: tuple[float, float, float]) -> None:
+    def there(p: Any) -> bool:
+        position, velocity = p.position, p.velocity
+        away = math.dist((position.north_m, position.east_m, position.down_m), place)
+        return away < 0.05 and math.hypot(velocity.north_m_s, velocity.east_m_s) < 0.05
+
+    await until(vehicle.telemetry.position_velocity_ned, there, 30, f"corner {place}")
+
+
+def test_an_offboard_square_without_swing_or_overshoot(
+    tmp_path: Path, record_property: pytest.RecordProperty
+) -> None:
+    with flying_vehicle(tmp_path) as vehicle:
+        asyncio.run(_square(vehicle.mavsdk, 5.0, 5.0))
+    flown = assert_landed(vehicle)
+    flown = flown.between(0.0, float(flown.time[flown.vehicle[:, 2] > 4.9][-1]))
+    corners = np.array([(0, 0), (0, 5), (5, 5), (5, 0), (0, 0)], dtype=float)
+    begin = int(np.argmax(flown.vehicle[:, 2] > 4.9))
+    passed = swing.overshoots(flown.vehicle[begin:, :2], corners)
+    load_passed = swing.overshoots(flown.load[begin:, :2], corners)
+    largest = float(swing.swing(flown.between(float(flown.time[begin]), 1e9)).max())
+    record_property("vehicle_overshoot_m", passed.tolist())
+    record_property("load_overshoot_m", load_passed.tolist())
+    record_property("largest_swing_deg", largest)
+    print(
+        f"corner overshoot: vehicle {passed.max():.3f} m, load {load_passed.max():.3f} m; {largest:.1f} deg"
+    )
+    # A load of a twentieth of a corner's length out of place would show; the acceleration limit of
+    # 2 m/s² alone swings it by atan(2 / 9.81) = 11.5 degrees.
+    assert passed.max() < 0.25
+    assert load_passed.max() < 0.25
+    assert largest < 20.0
+
+
+def _texts(link: Any, until_text: str, timeout: float) -> list[str]:
+    """STATUSTEXTs until one contains a text (pieces put together)."""
+    said: list[str] = []
+    pieces = ""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        link.mav.heartbeat_send(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0)
+        message = link.recv_match(type="STATUSTEXT", blocking=True, timeout=0.5)
+        if message is None:
+            continue
+        pieces += message.text
+        if message.id == 0 or len(message.text) < 50:
+            said.append(pieces)
+            pieces = ""
+            if until_text in said[-1]:
+                return said
+    raise AssertionError(f"nobody said {until_text!r}: {said}")
+
+
+def test_refusals_say_why(tmp_path: Path) -> None:
+    with flying_vehicle(tmp_path) as vehicle:
+        link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=245)
+        assert link.wait_heartbeat(timeout=20) is not None
+        for number, parameters, text in (
+            (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 1.0), "needs a remote control"),
+            (mavlink.MAV_CMD_MISSION_START, (), "upload one first"),
+            (mavlink.MAV_CMD_DO_REPOSITION, (-1.0,), "take off first"),
+        ):
+            link.mav.command_long_send(1, 1, number, 0, *parameters, *[math.nan] * (7 - len(parameters)))
+            _texts(link, text, 5.0)
+        link.close()
+    assert "armed" not in vehicle.log.read_text()
+
+
+def test_new_weights_fly_without_a_missed_tick(tmp_path: Path) -> None:
+    async def to_height(connection: str) -> None:
+        async with mavsdk_vehicle(connection) as vehicle:
+            await take_off(vehicle, 5.0)
+            await vehicle.param.set_param_float("LQR_Q_LPOS", 4.0)
+
+    with flying_vehicle(tmp_path) as vehicle:
+        link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=244)
+        asyncio.run(to_height(vehicle.mavsdk))
+        _texts(link, "New weights fly", 60.0)
+        time.sleep(2.0)
+        link.close()
+    flown = swing.read(vehicle.state_log)
+    still = flown.between(float(flown.time[-1]) - 1.0, 1e9)
+    assert np.ptp(still.load, axis=0).max() < 0.02
+    assert still.load[-1, 2] > 2.5
+
+
+def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_text("0123456789abcdef" * 4)
+    arguments = ("--clock", "lockstep", "--speed", "1", "--signing-key", str(key))
+    with flying_vehicle(tmp_path / "vehicle", arguments) as vehicle:
+        link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=245)
+        link.wait_heartbeat(timeout=20)  # pymavlink without a key takes what is signed
+        unsigned = (1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *[math.nan] * 6)
+        link.mav.command_long_send(*unsigned)
+        assert link.recv_match(type="COMMAND_ACK", blocking=True, timeout=2) is None
+        link.setup_signing(bytes.fromhex(key.read_text()), sign_outgoing=True)
+        link.mav.command_long_send(*unsigned)
+        ack = link.recv_match(type="COMMAND_ACK", blocking=True, timeout=5)
+        assert ack is not None
+        assert ack.result == mavlink.MAV_RESULT_ACCEPTED
+        link.close()
+
+
+@pytest.mark.parametrize(
+    ("script", "link"),
+    [
+        ("connect.py", "mavsdk"),
+        ("mission.py", "mavsdk"),
+        ("load_figure_eight.py", "mavproxy"),
+        ("parameter_sweep.py", "mavsdk"),
+    ],
+)
+def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
+    with flying_vehicle(tmp_path) as vehicle:
+        done = subprocess.run(
+            [sys.executable, str(EXAMPLES / script), getattr(vehicle, link)],
+            capture_output=True,
+            text=True,
+            timeout=200,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr + vehicle.log.read_text()[-2000:]
+        assert "landed" in done.stdout
+    assert_landed(vehicle)
+
+
+def test_the_fixture_example_runs_as_a_plugin(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "pytest", "-c", os.devnull),
+            *("-p", "sitl.pytest_plugin", "-p", "no:cacheprovider"),
+            str(EXAMPLES / "test_with_a_vehicle.py"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert "1 passed" in done.stdout, done.stdout + done.stderr
