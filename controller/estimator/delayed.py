@@ -51,20 +51,21 @@ def remember(f: Filter, kind: int) -> int:
         for j in range(CLONE_SIZE):
             f.Pzz[k, j] = 0.0
             f.Pzz[j, k] = 0.0
-        for j in range(ERROR_SIZE):
-            f.Pzx[k, j] = 0.0
+        for i in range(ERROR_SIZE):
+            f.Pxz[i, k] = 0.0
         f.z[k] = 0.0
     m.clone_time[slot] = m.time
     m.clone_kind[slot] = kind
+    m.clone_width = max(m.clone_width, base + CLONE_ROWS)
     if kind == CLONE_MOTION:
         for i in range(CLONE_ROWS):  # position and velocity lie side by side in both states
             f.z[base + i] = f.x[X_POSITION + i]
             for j in range(ERROR_SIZE):
-                f.Pzx[base + i, j] = cov[POSITION + i, j]
+                f.Pxz[j, base + i] = cov[POSITION + i, j]
         for i in range(CLONE_ROWS):
             for j in range(CLONE_SIZE):
-                f.Pzz[base + i, j] = f.Pzx[j, POSITION + i]
-                f.Pzz[j, base + i] = f.Pzx[j, POSITION + i]
+                f.Pzz[base + i, j] = f.Pxz[POSITION + i, j]
+                f.Pzz[j, base + i] = f.Pxz[POSITION + i, j]
         return slot
     row = f.vectors[0]
     for axis in range(3):
@@ -73,13 +74,13 @@ def remember(f: Filter, kind: int) -> int:
             total = 0.0
             for i in range(3):
                 total += row[LOAD + i] * cov[LOAD + i, j] + row[ATTITUDE + i] * cov[ATTITUDE + i, j]
-            f.Pzx[base + axis, j] = total
+            f.Pxz[j, base + axis] = total
     for axis in range(3):
         load_row(f, axis)
         for k in range(CLONE_SIZE):
             total = 0.0
             for i in range(3):
-                total += row[LOAD + i] * f.Pzx[k, LOAD + i] + row[ATTITUDE + i] * f.Pzx[k, ATTITUDE + i]
+                total += row[LOAD + i] * f.Pxz[LOAD + i, k] + row[ATTITUDE + i] * f.Pxz[ATTITUDE + i, k]
             f.Pzz[base + axis, k] = total
             f.Pzz[k, base + axis] = total
     return slot
@@ -129,10 +130,14 @@ def forget(f: Filter, kind: int, time: float) -> None:
             m.clone_kind[i] = CLONE_FREE
             for k in range(i * CLONE_ROWS, (i + 1) * CLONE_ROWS):
                 for j in range(ERROR_SIZE):
-                    f.Pzx[k, j] = 0.0
+                    f.Pxz[j, k] = 0.0
                 for j in range(CLONE_SIZE):
                     f.Pzz[k, j] = 0.0
                     f.Pzz[j, k] = 0.0
+    m.clone_width = 0
+    for i in range(CLONES):
+        if m.clone_kind[i] != CLONE_FREE:
+            m.clone_width = (i + 1) * CLONE_ROWS
 
 
 @kernel

@@ -10,16 +10,14 @@ import numpy as np
 from controller.estimator import step
 from controller.estimator.layout import (
     ALIGNING,
-    CLONE_SIZE,
     ERROR_SIZE,
+    FILTER,
     FLYING,
     INPUT,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_RELEASED,
-    MEMORY,
     MOST_ROTORS,
-    NOMINAL_SIZE,
     OUTPUT_SIZE,
     PARTS,
     SENSORS,
@@ -75,7 +73,7 @@ class Health(NamedTuple):
 class Estimator:
     """Error-state Kalman filter for vehicle and load. Deterministic; nothing is allocated in `tick`.
 
-    Once a tick: put what was measured into `given` (see layout.INPUT) by the methods below, then `tick(time)`,
+    Once a tick: put what was measured into `given` (layout.INPUT) by the methods below, then `tick(time)`,
     then read `state`, then report with `command` what the rotors are told from this tick on.
     """
 
@@ -84,35 +82,24 @@ class Estimator:
         self.vehicle = vehicle
         self.tuning = tuning
         self.period = period
-        self._arrays = (
-            parameters(vehicle, period, tuning),
-            np.zeros(1, dtype=MEMORY),
-            np.zeros(NOMINAL_SIZE),
-            np.zeros((ERROR_SIZE, ERROR_SIZE)),
-            np.zeros(CLONE_SIZE),
-            np.zeros((CLONE_SIZE, ERROR_SIZE)),
-            np.zeros((CLONE_SIZE, CLONE_SIZE)),
-            np.eye(ERROR_SIZE),
-            np.zeros((2, ERROR_SIZE, ERROR_SIZE)),
-            np.zeros((8, CLONE_SIZE)),
-        )
+        self._filter = np.zeros(1, dtype=FILTER)
         self._record = np.zeros(1, dtype=INPUT)
         self.given = self._record[0]
         """this tick's measurements, cleared by `tick`"""
         self._output = np.zeros(OUTPUT_SIZE)
         self._rotor_speed = np.zeros(MOST_ROTORS)
-        self._tick = step.tick.bind(*self._arrays, self._record, self._output)
-        self._change = step.change.bind(*self._arrays)
-        self._command = step.command.bind(self._arrays[1], self._rotor_speed)
-        self.memory = self._arrays[1][0]
+        self._tick = step.tick.bind(self._filter, self._record, self._output)
+        self._change = step.change.bind(self._filter)
+        self._command = step.command.bind(self._filter, self._rotor_speed)
+        self.memory = self._filter[0]["m"]
         self.reset()
 
     def reset(self, *, in_flight: bool = False) -> None:
         """Forget everything and align anew, at rest or in flight."""
-        for array in self._arrays[1:]:
-            array[...] = np.zeros((), dtype=array.dtype)
-        self._arrays[7][...] = np.eye(ERROR_SIZE)
-        self._arrays[2][X_ATTITUDE] = 1.0
+        self._filter[...] = np.zeros((), dtype=FILTER)
+        self._filter["p"] = parameters(self.vehicle, self.period, self.tuning)
+        self._filter["transition"][0] = np.eye(ERROR_SIZE)
+        self._filter["x"][0, X_ATTITUDE] = 1.0
         self._record[...] = np.zeros((), dtype=INPUT)
         self._output[...] = 0.0
         self.memory["in_flight"] = in_flight
@@ -166,7 +153,7 @@ class Estimator:
         return self._output
 
     def command(self, rotor_speed: Array) -> None:
-        """Note what the rotors are told from this tick on, rad/s (n,), so that the next tick knows the thrust."""
+        """Note what the rotors are told from this tick on, rad/s (n,): the next tick needs the thrust."""
         self._rotor_speed[: len(rotor_speed)] = rotor_speed
         self._command()
 
@@ -202,12 +189,12 @@ class Estimator:
     @property
     def nominal(self) -> Array:
         """The nominal state (33,), see layout; attitude as a quaternion, load relative to the vehicle."""
-        return self._arrays[2]
+        return np.asarray(self._filter["x"][0])
 
     @property
     def error_covariance(self) -> Array:
         """Covariance (32, 32) of the error state, see layout.PARTS."""
-        return self._arrays[3]
+        return np.asarray(self._filter["P"][0])
 
     def covariance(self) -> Array:
         """Covariance (18, 18) of `state()`, eq. 31."""

@@ -7,7 +7,7 @@ relative to the vehicle, in world axes: that is what the accelerometer sees, and
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +144,7 @@ MEMORY = np.dtype(
         ("load_resets", "i8"),
         ("stale_count", "i8"),
         ("last_magnetometer", "f8", 3),
+        ("clone_width", "i8"),
         ("clone_time", "f8", CLONES),
         ("clone_kind", "i8", CLONES),
         ("next_clone", "f8"),
@@ -184,26 +185,30 @@ INPUT = np.dtype(
 """The measurements of one tick."""
 
 
-class Filter(NamedTuple):
-    """Everything the kernels work on; all of it is written in place."""
+FILTER = np.dtype(
+    [
+        ("p", PARAMETERS),
+        ("m", MEMORY),
+        ("x", "f8", NOMINAL_SIZE),
+        ("P", "f8", (ERROR_SIZE, ERROR_SIZE)),
+        ("z", "f8", CLONE_SIZE),
+        ("Pxz", "f8", (ERROR_SIZE, CLONE_SIZE)),
+        ("Pzz", "f8", (CLONE_SIZE, CLONE_SIZE)),
+        ("wide", "f8", (ERROR_SIZE, CLONE_SIZE)),
+        ("transition", "f8", (ERROR_SIZE, ERROR_SIZE)),
+        ("scratch", "f8", (2, ERROR_SIZE, ERROR_SIZE)),
+        ("vectors", "f8", (8, CLONE_SIZE)),
+        ("row_index", "i8", ERROR_SIZE),
+        ("row_value", "f8", ERROR_SIZE),
+    ]
+)
+"""Everything the kernels work on, in one piece of memory; all but `p` is written in place.
 
-    p: Any
-    """record of PARAMETERS"""
-    m: Any
-    """record of MEMORY"""
-    x: Array
-    """(NOMINAL_SIZE,) nominal state"""
-    P: Array
-    """(ERROR_SIZE, ERROR_SIZE) covariance of the error state"""
-    z: Array
-    """(CLONE_SIZE,) remembered quantities"""
-    Pzx: Array
-    """(CLONE_SIZE, ERROR_SIZE) their covariance with the error state"""
-    Pzz: Array
-    """(CLONE_SIZE, CLONE_SIZE) and with each other"""
-    transition: Array
-    """(ERROR_SIZE, ERROR_SIZE) of one step; only the places in `process.COLUMNS` are ever written"""
-    scratch: Array
-    """(2, ERROR_SIZE, ERROR_SIZE)"""
-    vectors: Array
-    """(8, CLONE_SIZE): scratch vectors; see `update`"""
+p, m: PARAMETERS and MEMORY; x: nominal state; P: covariance of the error state; z: remembered quantities, Pxz
+and Pzz: their covariance with the error state and with each other; transition: of one step, of which only the
+places in `process.COLUMNS` are ever written; scratch, vectors, row_*: see `process` and `update`.
+m.clone_width: columns of Pxz up to the last remembered instant in use.
+"""
+
+Filter = Any
+"""One record of FILTER."""

@@ -17,9 +17,6 @@ from controller.estimator.layout import (
     ACCEL_BIAS,
     ATTITUDE,
     BARO_OFFSET,
-    CLONE_FREE,
-    CLONE_ROWS,
-    CLONES,
     ERROR_SIZE,
     FLYING,
     FORCE,
@@ -374,51 +371,40 @@ def _stand(f: Filter, step: float) -> None:
 def _propagate(f: Filter) -> None:
     """P = Phi P Phi', exactly symmetric; and the covariance with the remembered instants."""
     phi, cov, first, second = f.transition, f.P, f.scratch[0], f.scratch[1]
-    _rows(phi, cov, first)
+    _rows(phi, cov, first, ERROR_SIZE)
     for i in range(ERROR_SIZE):
         for j in range(ERROR_SIZE):
             second[i, j] = first[j, i]
-    _rows(phi, second, first)
+    _rows(phi, second, first, ERROR_SIZE)
     for i in range(ERROR_SIZE):
         for j in range(i + 1):
             mean = 0.5 * (first[i, j] + first[j, i])
             cov[i, j] = mean
             cov[j, i] = mean
-    turned = f.vectors[2]
-    for clone in range(CLONES):
-        if f.m.clone_kind[clone] == CLONE_FREE:
-            continue
-        for row in range(clone * CLONE_ROWS, (clone + 1) * CLONE_ROWS):
-            for i in range(ERROR_SIZE):
-                start, end = ROW_STARTS[i], ROW_STARTS[i + 1]
-                if start == end:
-                    turned[i] = f.Pzx[row, i]
-                else:
-                    total = 0.0
-                    for index in range(start, end):
-                        total += phi[i, COLUMNS[index]] * f.Pzx[row, COLUMNS[index]]
-                    turned[i] = total
-            for i in range(ERROR_SIZE):
-                f.Pzx[row, i] = turned[i]
+    width = f.m.clone_width
+    if width > 0:
+        _rows(phi, f.Pxz, f.wide, width)
+        for i in range(ERROR_SIZE):
+            for j in range(width):
+                f.Pxz[i, j] = f.wide[i, j]
 
 
 @kernel
-def _rows(phi: Array, source: Array, out: Array) -> None:
-    """out = Phi source, using where Phi has entries."""
+def _rows(phi: Array, source: Array, out: Array, width: int) -> None:
+    """out = Phi source, `width` columns of it, using where Phi has entries."""
     for i in range(ERROR_SIZE):
         start, end = ROW_STARTS[i], ROW_STARTS[i + 1]
         if start == end:
-            for j in range(ERROR_SIZE):
+            for j in range(width):
                 out[i, j] = source[i, j]
         else:
-            for j in range(ERROR_SIZE):
+            for j in range(width):
                 out[i, j] = 0.0
             for index in range(start, end):
                 column = COLUMNS[index]
                 factor = phi[i, column]
-                if factor != 0.0:
-                    for j in range(ERROR_SIZE):
-                        out[i, j] += factor * source[column, j]
+                for j in range(width):
+                    out[i, j] += factor * source[column, j]
 
 
 @kernel

@@ -35,7 +35,7 @@ from controller.estimator.layout import (
 )
 from controller.estimator.process import cable
 from controller.estimator.rotation import matrix
-from controller.estimator.update import ROW, begin, fuse, inject, project
+from controller.estimator.update import ROW, begin, fuse, inject, predicted_variance
 from sitl_bridge.compiled import kernel
 
 STALE_SAMPLES = 50
@@ -64,18 +64,9 @@ def book(f: Filter, sensor: int, squares: float, degrees: int) -> None:
 
 
 @kernel
-def clear(f: Filter) -> None:
-    """Clear a measurement row that was only looked at."""
-    row = f.vectors[ROW]
-    for i in range(row.shape[0]):
-        row[i] = 0.0
-
-
-@kernel
 def ratio_of(f: Filter, sensor: int, innovation: float, noise: float) -> float:
     """Innovation over its gate for the present row, which is cleared."""
-    variance = project(f) + noise
-    clear(f)
+    variance = predicted_variance(f) + noise
     return abs(innovation) / (f.p.gate[sensor] * math.sqrt(variance))
 
 

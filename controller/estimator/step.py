@@ -15,9 +15,8 @@ from controller.estimator.layout import (
     BODY_RATES_OUT,
     CLONE_LOAD,
     CLONE_MOTION,
-    CLONE_SIZE,
-    ERROR_SIZE,
     EULER_OUT,
+    FILTER,
     FLYING,
     FORCE,
     INPUT,
@@ -28,11 +27,8 @@ from controller.estimator.layout import (
     LOAD_RELEASED,
     LOAD_VELOCITY,
     LOAD_VELOCITY_OUT,
-    MEMORY,
     MOST_ROTORS,
-    NOMINAL_SIZE,
     OUTPUT_SIZE,
-    PARAMETERS,
     POSITION_OUT,
     STANDING,
     VELOCITY_OUT,
@@ -57,20 +53,6 @@ from controller.estimator.sensors import (
 from controller.estimator.transitions import release, watch
 from controller.estimator.update import set_part
 from sitl_bridge.compiled import Buffer, entry_point, kernel
-
-BUFFERS = (
-    Buffer(PARAMETERS, (1,)),
-    Buffer(MEMORY, (1,)),
-    Buffer(np.float64, (NOMINAL_SIZE,)),
-    Buffer(np.float64, (ERROR_SIZE, ERROR_SIZE)),
-    Buffer(np.float64, (CLONE_SIZE,)),
-    Buffer(np.float64, (CLONE_SIZE, ERROR_SIZE)),
-    Buffer(np.float64, (CLONE_SIZE, CLONE_SIZE)),
-    Buffer(np.float64, (ERROR_SIZE, ERROR_SIZE)),
-    Buffer(np.float64, (2, ERROR_SIZE, ERROR_SIZE)),
-    Buffer(np.float64, (8, CLONE_SIZE)),
-)
-"""The arrays of `Filter`, in its order."""
 
 MOST_MISSED_TICKS = 50
 
@@ -128,31 +110,17 @@ def report(f: Filter, out: Array) -> None:
     out[EULER_OUT + 2] = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
 
 
-@entry_point(*BUFFERS, Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
-def tick(
-    record: Any,
-    memory: Any,
-    x: Array,
-    covariance: Array,
-    z: Array,
-    mixed: Array,
-    remembered: Array,
-    transition: Array,
-    scratch: Array,
-    vectors: Array,
-    given: Any,
-    out: Array,
-) -> int:
-    """One tick: `one_tick` on the filter that these arrays make up (see `Filter`); returns the mode."""
-    f = Filter(record[0], memory[0], x, covariance, z, mixed, remembered, transition, scratch, vectors)
-    one_tick(f, given[0], out)
-    return int(memory[0].vehicle_mode)
+@entry_point(Buffer(FILTER, (1,)), Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
+def tick(record: Any, given: Any, out: Array) -> int:
+    """One tick: `one_tick` on the filter's record; returns the vehicle's mode."""
+    one_tick(record[0], given[0], out)
+    return int(record[0].m.vehicle_mode)
 
 
-@entry_point(Buffer(MEMORY, (1,)), Buffer(np.float64, (MOST_ROTORS,)))
-def command(memory: Any, rotor_speed: Array) -> int:
+@entry_point(Buffer(FILTER, (1,)), Buffer(np.float64, (MOST_ROTORS,)))
+def command(record: Any, rotor_speed: Array) -> int:
     """Note the rotor speeds (rad/s) that are commanded from this tick on."""
-    m = memory[0]
+    m = record[0].m
     row = m.command_count % m.commands.shape[0]
     for i in range(MOST_ROTORS):
         m.commands[row, i] = rotor_speed[i]
@@ -160,23 +128,10 @@ def command(memory: Any, rotor_speed: Array) -> int:
     return int(m.command_count)
 
 
-@entry_point(*BUFFERS, int, int)
-def change(
-    record: Any,
-    memory: Any,
-    x: Array,
-    covariance: Array,
-    z: Array,
-    mixed: Array,
-    remembered: Array,
-    transition: Array,
-    scratch: Array,
-    vectors: Array,
-    vehicle_mode: int,
-    load_mode: int,
-) -> int:
+@entry_point(Buffer(FILTER, (1,)), int, int)
+def change(record: Any, vehicle_mode: int, load_mode: int) -> int:
     """Change what holds the vehicle and what the load does; returns the vehicle's mode."""
-    f = Filter(record[0], memory[0], x, covariance, z, mixed, remembered, transition, scratch, vectors)
+    f = record[0]
     m = f.m
     if load_mode != m.load_mode:
         if load_mode == LOAD_RELEASED:

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from controller.estimator.layout import (
     ATTITUDE,
-    CLONE_FREE,
-    CLONE_ROWS,
-    CLONES,
+    CLONE_SIZE,
     ERROR_SIZE,
     X_ATTITUDE,
     X_RATES,
@@ -24,7 +22,7 @@ from sitl_bridge.compiled import kernel
 SCRATCH = 2
 """Free between calls."""
 ROW = 3
-"""The measurement row h (ERROR_SIZE,), dense; only where it is not zero does it cost."""
+"""The measurement row h (ERROR_SIZE,); what measures writes it, what takes it in clears it."""
 CORRECTION = 4
 """The correction of the error state that the scalars so far ask for (ERROR_SIZE,)."""
 SHARED = 5
@@ -41,24 +39,34 @@ def begin(f: Filter) -> None:
     for i in range(ERROR_SIZE):
         f.vectors[ROW, i] = 0.0
         f.vectors[CORRECTION, i] = 0.0
-    for i in range(CLONES * CLONE_ROWS):
+    for i in range(CLONE_SIZE):
         f.vectors[CORRECTION_CLONES, i] = 0.0
 
 
 @kernel
-def project(f: Filter) -> float:
-    """Write P h and the clones' part for the present row h; returns h'P h, the predicted variance."""
-    shared, cov, row = f.vectors[SHARED], f.P, f.vectors[ROW]
-    for j in range(ERROR_SIZE):
-        shared[j] = 0.0
+def collect(f: Filter) -> int:
+    """List where the row h has entries, move them to the list, and clear the row; returns how many."""
+    row, index, value = f.vectors[ROW], f.row_index, f.row_value
+    count = 0
     for i in range(ERROR_SIZE):
-        factor = row[i]
-        if factor != 0.0:
-            for j in range(ERROR_SIZE):
-                shared[j] += factor * cov[i, j]
-    variance = 0.0
-    for i in range(ERROR_SIZE):
-        variance += row[i] * shared[i]
+        if row[i] != 0.0:
+            index[count] = i
+            value[count] = row[i]
+            row[i] = 0.0
+            count += 1
+    return count
+
+
+@kernel
+def predicted_variance(f: Filter) -> float:
+    """h'P h of the present row, which is cleared."""
+    count = collect(f)
+    cov, index, value, variance = f.P, f.row_index, f.row_value, 0.0
+    for i in range(count):
+        total = 0.0
+        for j in range(count):
+            total += cov[index[i], index[j]] * value[j]
+        variance += total * value[i]
     return variance
 
 
@@ -69,76 +77,70 @@ def fuse(f: Filter, innovation: float, noise: float) -> float:
     innovation: measured minus predicted at the nominal state, before the corrections so far; noise: variance.
     Returns the normalised innovation squared, chi-square with one degree of freedom.
     """
-    row, shared = f.vectors[ROW], f.vectors[SHARED]
-    prior = project(f)
-    remembered = f.vectors[SHARED_CLONES]
-    for clone in range(CLONES):
-        if f.m.clone_kind[clone] != CLONE_FREE:
-            for k in range(clone * CLONE_ROWS, (clone + 1) * CLONE_ROWS):
-                total = 0.0
-                for i in range(ERROR_SIZE):
-                    total += f.Pzx[k, i] * row[i]
-                remembered[k] = total
-    left = innovation
-    for i in range(ERROR_SIZE):
-        left -= row[i] * f.vectors[CORRECTION, i]
-    _apply(f, left, prior + noise)
-    # The second half of Joseph's form: (I - k h')P is there; times (I - k h')', plus k r k'.
-    cov, doubled = f.P, f.vectors[SCRATCH]
+    count = collect(f)
+    index, value, cov = f.row_index, f.row_value, f.P
+    shared, remembered, doubled = f.vectors[SHARED], f.vectors[SHARED_CLONES], f.vectors[SCRATCH]
     for j in range(ERROR_SIZE):
-        doubled[j] = -noise * shared[j] / (prior + noise)
+        shared[j] = 0.0
+    for j in range(f.m.clone_width):
+        remembered[j] = 0.0
+    for n in range(count):
+        factor, i = value[n], index[n]
+        for j in range(ERROR_SIZE):
+            shared[j] += factor * cov[i, j]
+        for j in range(f.m.clone_width):
+            remembered[j] += factor * f.Pxz[i, j]
+    variance, left = noise, innovation
+    for n in range(count):
+        variance += value[n] * shared[index[n]]
+        left -= value[n] * f.vectors[CORRECTION, index[n]]
+    _apply(f, left, variance)
+    # The second half of Joseph's form: (I - k h')P is there; times (I - k h')', plus k r k'.
+    for j in range(ERROR_SIZE):
+        doubled[j] = -noise / variance * shared[j]
+    for n in range(count):
+        factor, i = value[n], index[n]
+        for j in range(ERROR_SIZE):
+            doubled[j] += factor * cov[i, j]
     for i in range(ERROR_SIZE):
-        factor = row[i]
-        row[i] = 0.0
-        if factor != 0.0:
-            for j in range(ERROR_SIZE):
-                doubled[j] += factor * cov[i, j]
-    for i in range(ERROR_SIZE):
-        factor = doubled[i] / (prior + noise)
+        factor = doubled[i] / variance
         for j in range(ERROR_SIZE):
             cov[i, j] -= factor * shared[j]
-    return left * left / (prior + noise)
+    return left * left / variance
 
 
 @kernel
 def fuse_remembered(f: Filter, index: int, innovation: float, noise: float) -> float:
     """Take in one scalar that measures the remembered quantity `index`; otherwise as `fuse`."""
-    shared = f.vectors[SHARED]
+    shared, remembered = f.vectors[SHARED], f.vectors[SHARED_CLONES]
     for i in range(ERROR_SIZE):
-        shared[i] = f.Pzx[index, i]
-    remembered = f.vectors[SHARED_CLONES]
-    for clone in range(CLONES):
-        if f.m.clone_kind[clone] != CLONE_FREE:
-            for k in range(clone * CLONE_ROWS, (clone + 1) * CLONE_ROWS):
-                remembered[k] = f.Pzz[k, index]
-    prior = f.Pzz[index, index]
+        shared[i] = f.Pxz[i, index]
+    for k in range(f.m.clone_width):
+        remembered[k] = f.Pzz[index, k]
+    variance = f.Pzz[index, index] + noise
     left = innovation - f.vectors[CORRECTION_CLONES, index]
-    _apply(f, left, prior + noise)
-    return left * left / (prior + noise)
+    _apply(f, left, variance)
+    return left * left / variance
 
 
 @kernel
 def _apply(f: Filter, left: float, variance: float) -> None:
     """Correct by one scalar: P - k u' with u = P h (in SHARED) and k = u / variance; clones likewise."""
     cov, shared, remembered = f.P, f.vectors[SHARED], f.vectors[SHARED_CLONES]
-    inverse = 1.0 / variance
+    correction, moved = f.vectors[CORRECTION], f.vectors[CORRECTION_CLONES]
+    width = f.m.clone_width
     for i in range(ERROR_SIZE):
-        gain = shared[i] * inverse
-        f.vectors[CORRECTION, i] += gain * left
+        gain = shared[i] / variance
+        correction[i] += gain * left
         for j in range(ERROR_SIZE):
             cov[i, j] -= gain * shared[j]
-    for clone in range(CLONES):
-        if f.m.clone_kind[clone] == CLONE_FREE:
-            continue
-        for k in range(clone * CLONE_ROWS, (clone + 1) * CLONE_ROWS):
-            gain = remembered[k] * inverse
-            f.vectors[CORRECTION_CLONES, k] += gain * left
-            for j in range(ERROR_SIZE):
-                f.Pzx[k, j] -= gain * shared[j]
-            for other in range(CLONES):
-                if f.m.clone_kind[other] != CLONE_FREE:
-                    for j in range(other * CLONE_ROWS, (other + 1) * CLONE_ROWS):
-                        f.Pzz[k, j] -= gain * remembered[j]
+        for j in range(width):
+            f.Pxz[i, j] -= gain * remembered[j]
+    for k in range(width):
+        gain = remembered[k] / variance
+        moved[k] += gain * left
+        for j in range(width):
+            f.Pzz[k, j] -= gain * remembered[j]
 
 
 @kernel
@@ -150,10 +152,8 @@ def inject(f: Filter) -> None:
     turn(x, correction[ATTITUDE], correction[ATTITUDE + 1], correction[ATTITUDE + 2])
     for i in range(ATTITUDE + 3, ERROR_SIZE):
         x[i + X_RATES - X_ATTITUDE - 3] += correction[i]
-    for clone in range(CLONES):
-        if f.m.clone_kind[clone] != CLONE_FREE:
-            for k in range(clone * CLONE_ROWS, (clone + 1) * CLONE_ROWS):
-                f.z[k] += f.vectors[CORRECTION_CLONES, k]
+    for k in range(f.m.clone_width):
+        f.z[k] += f.vectors[CORRECTION_CLONES, k]
 
 
 @kernel
@@ -163,6 +163,6 @@ def set_part(f: Filter, start: int, size: int, std: float) -> None:
         for j in range(ERROR_SIZE):
             f.P[i, j] = 0.0
             f.P[j, i] = 0.0
-        for k in range(CLONES * CLONE_ROWS):
-            f.Pzx[k, i] = 0.0
+        for k in range(CLONE_SIZE):
+            f.Pxz[i, k] = 0.0
         f.P[i, i] = std * std
