@@ -27,7 +27,7 @@ import tempfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -50,12 +50,15 @@ class Buffer(NamedTuple):
 Scalar = type[int] | type[float]
 
 
-def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kernel(function: Function) -> Function:
     """Mark a function that compiled code calls; plain Python except while compiling."""
     if os.environ.get(_COMPILING):
         from numba import njit
 
-        compiled: Callable[..., Any] = njit(error_model="numpy")(function)
+        compiled: Function = njit(error_model="numpy")(function)
         return compiled
     return function
 
@@ -63,7 +66,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def entry_point(
     *arguments: Buffer | Scalar, returns: Scalar = int
 ) -> Callable[[Callable[..., Any]], EntryPoint]:
-    """Mark a function that Python calls: `Buffer` for each array first, then `int` or `float` for each scalar."""
+    """Mark a function that Python calls: a `Buffer` for each array first, then `int` or `float` a scalar."""
     return lambda function: EntryPoint(function, arguments, returns)
 
 
@@ -148,6 +151,11 @@ class _Bound(partial[Any]):
 
 
 _engines: dict[str, Any] = {}
+
+
+def load(module: str) -> None:
+    """Have the machine code of a module's entry points at hand, compiling it if need be."""
+    _engine(module)
 
 
 def _engine(module: str) -> Any:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from sitl_bridge.compiled import kernel
+
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
@@ -29,16 +31,19 @@ GAUSS_PER_TESLA = 1e4
 _HALF = math.sqrt(0.5)
 
 
+@kernel
 def enu_to_ned(v: Triple) -> Triple:
     """World vector, ENU to NED; its own inverse."""
     return (v[1], v[0], -v[2])
 
 
+@kernel
 def flu_to_frd(v: Triple) -> Triple:
     """Body vector, FLU to FRD; its own inverse."""
     return (v[0], -v[1], -v[2])
 
 
+@kernel
 def attitude_to_ned_frd(q: Quaternion) -> Quaternion:
     """Attitude (FLU to ENU) as MAVLink has it (FRD to NED): C·R·D as a product of quaternions.
 
@@ -55,6 +60,7 @@ attitude_to_enu_flu = (
 )
 
 
+@kernel
 def rotate(q: Quaternion, v: Triple) -> Triple:
     """Rotate a body vector into the world by a unit quaternion."""
     w, x, y, z = q
@@ -66,11 +72,13 @@ def rotate(q: Quaternion, v: Triple) -> Triple:
     )
 
 
+@kernel
 def rotate_inverse(q: Quaternion, v: Triple) -> Triple:
     """Rotate a world vector into the body by a unit quaternion."""
     return rotate((q[0], -q[1], -q[2], -q[3]), v)
 
 
+@kernel
 def euler_from_quaternion(q: Quaternion) -> Triple:
     """Roll, pitch, yaw in rad, for R = Rz(yaw)·Ry(pitch)·Rx(roll)."""
     w, x, y, z = q

@@ -146,7 +146,8 @@ def write_frame(
     out[at + 8] = (message_id >> 8) & 0xFF
     out[at + 9] = (message_id >> 16) & 0xFF
     body = at + HEADER_LENGTH_V2
-    out[body : body + length] = payload[:length]
+    for index in range(length):
+        out[body + index] = payload[index]
     tail = body + length
     crc = checksum(out, at + 1, tail, int(CRC_EXTRA[message_id]))
     out[tail] = crc & 0xFF
@@ -158,8 +159,9 @@ def write_frame(
 def read_payload(data: Bytes, row: NDArray[np.int32], payload: Bytes) -> None:
     """Copy a scanned frame's payload into `payload`, zeros where MAVLink 2 cut them off."""
     length = min(row[PAYLOAD_LENGTH], payload.size)
-    payload[:length] = data[row[PAYLOAD] : row[PAYLOAD] + length]
-    payload[length:] = 0
+    start = row[PAYLOAD]
+    for index in range(payload.size):
+        payload[index] = data[start + index] if index < length else 0
 
 
 class Frame(NamedTuple):

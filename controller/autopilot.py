@@ -1,0 +1,58 @@
+"""The autopilot between its links: it arms when it knows where it is, and flies its reference. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from controller.allocation import allocation
+from controller.designs import design
+from controller.law import WORK, engaged_memory
+from controller.reference import Path
+from controller.state import LOAD_POSITION, Array
+from controller.step import control_step
+from sitl_bridge.vehicle import Vehicle
+
+PathFrom = Callable[[tuple[float, float, float]], Path]
+"""Makes the reference path, given where the load is (m, world) when the law takes over."""
+
+
+class Autopilot:
+    """Control law and allocation of one vehicle; `controls` (16,) are its rotor commands, 0..1."""
+
+    def __init__(
+        self, vehicle: Vehicle, design_name: str, rate_hz: float, path_from: PathFrom, controls: Array
+    ) -> None:
+        self.armed = False
+        self.ticks = 0
+        """Control steps since it armed."""
+        self._controls = controls
+        self._path_from = path_from
+        self._design = design(design_name, vehicle, rate_hz)
+        self._allocation = allocation(vehicle)
+        self._step: Callable[[], int] | None = None
+
+    def disarm(self) -> None:
+        """Stop the rotors; the next step arms and starts afresh."""
+        self.armed = False
+        self._step = None
+
+    def step(self, estimate: Array) -> None:
+        """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
+        if self._step is None:
+            load = estimate[LOAD_POSITION]
+            path = self._path_from((float(load[0]), float(load[1]), float(load[2])))
+            self._step = control_step.bind(
+                self._design,
+                self._allocation,
+                path,
+                engaged_memory(load),
+                np.zeros(1, dtype=WORK),
+                estimate,
+                self._controls,
+            )
+            self.armed = True
+            self.ticks = 0
+        self._step()
+        self.ticks += 1

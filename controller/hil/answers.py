@@ -1,0 +1,65 @@
+"""The autopilot's answer to a tick: HIL_ACTUATOR_CONTROLS; compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sitl_bridge.compiled import Buffer, entry_point
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.mavlink.framing import Bytes, Packer, write_frame
+from sitl_bridge.mavlink.hil import FLAG_LOCKSTEP, HIL_ACTUATOR_CONTROLS, MODE_FLAG_ARMED
+
+_ANSWER_ID = HIL_ACTUATOR_CONTROLS.message_id
+_PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
+CONTROLS = 16
+ANSWER_SIZE = 128  # a frame of 81 bytes of payload, with room
+
+
+@entry_point(
+    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
+    Buffer(np.uint8, (_PAYLOAD_SIZE,)),
+    Buffer(np.float64, (CONTROLS,)),
+    Buffer(np.uint8, (ANSWER_SIZE,)),
+    int,
+    int,
+    int,
+    int,
+)
+def write_answer(
+    records: Any,
+    payload: Bytes,
+    controls: Any,
+    out: Bytes,
+    time_usec: int,
+    armed: int,
+    sequence: int,
+    system: int,
+) -> int:
+    """Write the answer to a tick, with controls (16,) of 0..1 when armed; returns its length."""
+    record = records[0]
+    record.time_usec = time_usec
+    record.flags = FLAG_LOCKSTEP
+    record.mode = MODE_FLAG_ARMED if armed else 0
+    for i in range(CONTROLS):
+        record.controls[i] = controls[i] if armed else 0.0
+    return int(write_frame(out, 0, payload, _ANSWER_ID, sequence, system, COMPONENT_AUTOPILOT))
+
+
+class AnswerWriter:
+    """Builds answers of one instance; `controls` (16,) is what the next one carries."""
+
+    def __init__(self, instance: int, packer: Packer) -> None:
+        self.controls = np.zeros(CONTROLS)
+        self._system = vehicle_system(instance)
+        self._packer = packer
+        record, payload = HIL_ACTUATOR_CONTROLS.record()
+        out = np.zeros(ANSWER_SIZE, dtype=np.uint8)
+        self._view = out.data
+        self._write = write_answer.bind(record, payload, self.controls, out)
+
+    def answer(self, time_usec: int, armed: bool) -> bytes:
+        """The frame that answers the tick of `time_usec`."""
+        length = self._write(time_usec, armed, self._packer.next_sequence(), self._system)
+        return bytes(self._view[:length])

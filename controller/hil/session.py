@@ -1,0 +1,139 @@
+"""The autopilot's side of the HIL link as a protocol object: one answer for each tick. No I/O.
+
+A repeated tick gets the same bytes again, without a second control step; a tick that a newer one has
+overtaken gets none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from pymavlink.dialects.v20 import common
+
+from controller.autopilot import Autopilot
+from controller.hil.answers import AnswerWriter
+from controller.hil.ticks import TickReader
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.mavlink.hil import ODOMETRY
+
+PLANT_TIMEOUT = 1.0
+"""Silence of the plant after which it is said to be gone, s."""
+REQUEST_INTERVAL = 0.2
+"""Between two requests for truth, s."""
+HIL_STATE_QUATERNION = common.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
+PX4_STATE_INTERVAL_US = 5000  # what PX4 asks a simulator for on connecting
+
+
+class HilSession:
+    """Answers the ticks of one plant; `receive(datagram, now)`, `to_send(now)`, `next_deadline()`."""
+
+    def __init__(
+        self,
+        autopilot: Autopilot,
+        writer: AnswerWriter,
+        packer: Packer,
+        instance: int,
+        say: Callable[[str], None],
+    ) -> None:
+        self.steps = 0
+        """Control steps made."""
+        self._autopilot = autopilot
+        self._writer = writer
+        self._packer = packer
+        self._say = say
+        self._reader = TickReader(instance)
+        self._instance = instance
+        self._out: list[bytes] = []
+        self._last_time = 0
+        self._last_answer: bytes | None = None
+        self._last_heard: float | None = None
+        self._next_request = 0.0
+
+    def next_deadline(self) -> float:
+        """When the plant's silence is worth a word."""
+        return float("inf") if self._last_heard is None else self._last_heard + PLANT_TIMEOUT
+
+    def to_send(self, now: float) -> list[bytes]:
+        """Datagrams for the plant."""
+        if self._last_heard is not None and now >= self._last_heard + PLANT_TIMEOUT:
+            self._say(f"no HIL_SENSOR for {PLANT_TIMEOUT:g} s: waiting for the plant")
+            self._last_heard = None
+        if not self._out:
+            return []
+        out, self._out = self._out, []
+        return out
+
+    def receive(self, datagram: bytes, now: float) -> None:
+        """Take a datagram from the plant; the answer is in `to_send`."""
+        tick = self._reader.read(datagram)
+        if tick.time_usec is None:
+            return
+        if self._last_answer is None:
+            self._connect()
+        if tick.time_usec == self._last_time and self._last_answer is not None:
+            self._out.append(self._last_answer)
+        elif tick.time_usec > self._last_time or self._last_heard is None:
+            if tick.time_usec <= self._last_time:
+                self._say("the plant has started again")
+                self._autopilot.disarm()
+            self._answer(tick.time_usec, tick.truth, now)
+        else:
+            return  # overtaken by a newer tick
+        self._last_heard = now
+
+    def _answer(self, time_usec: int, truth: bool, now: float) -> None:
+        if truth and np.isfinite(self._reader.estimate).all():
+            if not self._autopilot.armed:
+                self._say("plant and truth are there: armed, flying")
+            self._autopilot.step(self._reader.estimate)
+            self.steps += 1
+        else:
+            self._autopilot.disarm()
+            if now >= self._next_request:
+                self._next_request = now + REQUEST_INTERVAL
+                self._request(ODOMETRY.message_id, 0.0)
+        self._last_time = time_usec
+        self._last_answer = self._writer.answer(time_usec, self._autopilot.armed)
+        self._out.append(self._last_answer)
+
+    def _connect(self) -> None:
+        """What PX4 says on connecting: a heartbeat, and a request for the simulator's state."""
+        self._say("plant connected")
+        heartbeat = common.MAVLink_heartbeat_message(
+            type=common.MAV_TYPE_QUADROTOR,
+            autopilot=common.MAV_AUTOPILOT_PX4,
+            base_mode=0,
+            custom_mode=0,
+            system_status=common.MAV_STATE_STANDBY,
+            mavlink_version=3,
+        )
+        self._out.append(self._packer.pack(heartbeat))
+        self._request(HIL_STATE_QUATERNION, PX4_STATE_INTERVAL_US)
+
+    def _request(self, message_id: int, interval_us: float) -> None:
+        """SET_MESSAGE_INTERVAL (0: the plant's own rate, every tick)."""
+        command = common.MAVLink_command_long_message(
+            target_system=0,
+            target_component=0,
+            command=common.MAV_CMD_SET_MESSAGE_INTERVAL,
+            confirmation=0,
+            param1=message_id,
+            param2=interval_us,
+            param3=0,
+            param4=0,
+            param5=0,
+            param6=0,
+            param7=0,
+        )
+        self._out.append(self._packer.pack(command))
+
+
+def new_session(
+    make_autopilot: Callable[[np.ndarray], Autopilot], instance: int, say: Callable[[str], None]
+) -> HilSession:
+    """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,)."""
+    packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
+    writer = AnswerWriter(instance, packer)
+    return HilSession(make_autopilot(writer.controls), writer, packer, instance, say)

@@ -1,0 +1,140 @@
+"""What the plant says in a tick: time, and truth where it was asked for; compiled."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from controller.state import STATE_SIZE, Array
+from sitl_bridge.compiled import Buffer, entry_point, kernel
+from sitl_bridge.frames import attitude_to_enu_flu, enu_to_ned, euler_from_quaternion, flu_to_frd, rotate
+from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
+from sitl_bridge.mavlink.framing import (
+    COMPONENT,
+    DATAGRAM,
+    FRAME_TABLE,
+    LARGEST_DATAGRAM,
+    MESSAGE_ID,
+    MOST_FRAMES,
+    SYSTEM,
+    TABLE_COLUMNS,
+    Bytes,
+    Frame,
+    frame_at,
+    read_payload,
+    scan,
+)
+from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, ODOMETRY
+
+INCOMING = np.dtype([("sensor", HIL_SENSOR.dtype), ("vehicle", ODOMETRY.dtype), ("load", ODOMETRY.dtype)])
+_SENSOR_ID, _GPS_ID, _ODOMETRY_ID = HIL_SENSOR.message_id, HIL_GPS.message_id, ODOMETRY.message_id
+_SENSOR_SIZE, _ODOMETRY_SIZE = HIL_SENSOR.dtype.itemsize, ODOMETRY.dtype.itemsize
+
+# What `read_tick` found, as bits.
+TICK, VEHICLE_TRUTH, LOAD_TRUTH, OTHERS = 1, 2, 4, 8
+
+
+@kernel
+def estimate_from_truth(vehicle: Any, load: Any, estimate: Array) -> None:
+    """Eq. 31's state (18,), ENU and FLU, from ODOMETRY of vehicle (velocities in BODY_FRD) and load."""
+    q = vehicle.q
+    size = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) ** 0.5
+    attitude = attitude_to_enu_flu((q[0] / size, q[1] / size, q[2] / size, q[3] / size))
+    estimate[0], estimate[1], estimate[2] = enu_to_ned((vehicle.x, vehicle.y, vehicle.z))
+    estimate[3], estimate[4], estimate[5] = enu_to_ned((load.x, load.y, load.z))
+    body_velocity = flu_to_frd((vehicle.vx, vehicle.vy, vehicle.vz))
+    estimate[6], estimate[7], estimate[8] = rotate(attitude, body_velocity)
+    estimate[9], estimate[10], estimate[11] = enu_to_ned((load.vx, load.vy, load.vz))
+    rates = flu_to_frd((vehicle.rollspeed, vehicle.pitchspeed, vehicle.yawspeed))
+    estimate[12], estimate[13], estimate[14] = rates
+    estimate[15], estimate[16], estimate[17] = euler_from_quaternion(attitude)
+
+
+@entry_point(
+    DATAGRAM,
+    FRAME_TABLE,
+    Buffer(INCOMING, (1,)),
+    Buffer(np.uint8, (INCOMING.itemsize,)),
+    Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.int64, (2,)),
+    int,
+    int,
+    int,
+)
+def read_tick(
+    data: Bytes,
+    table: Any,
+    records: Any,
+    payloads: Bytes,
+    estimate: Array,
+    header: Any,
+    length: int,
+    vehicle_sys: int,
+    load_sys: int,
+) -> int:
+    """Read data[:length]; returns bits of what was found.
+
+    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written.
+    """
+    count = scan(data, table, length)
+    header[0] = count
+    found = 0
+    for i in range(count):
+        message_id = table[i, MESSAGE_ID]
+        system, component = table[i, SYSTEM], table[i, COMPONENT]
+        if message_id == _SENSOR_ID:
+            read_payload(data, table[i], payloads[:_SENSOR_SIZE])
+            found |= TICK
+        elif message_id == _ODOMETRY_ID and system == vehicle_sys and component == COMPONENT_TRUTH:
+            read_payload(data, table[i], payloads[_SENSOR_SIZE : _SENSOR_SIZE + _ODOMETRY_SIZE])
+            found |= VEHICLE_TRUTH
+        elif message_id == _ODOMETRY_ID and system == load_sys and component == COMPONENT_LOAD:
+            read_payload(data, table[i], payloads[_SENSOR_SIZE + _ODOMETRY_SIZE :])
+            found |= LOAD_TRUTH
+        elif message_id != _GPS_ID:
+            found |= OTHERS
+    if found & TICK:
+        header[1] = records[0].sensor.time_usec
+    if found & VEHICLE_TRUTH and found & LOAD_TRUTH:
+        estimate_from_truth(records[0].vehicle, records[0].load, estimate)
+    return found
+
+
+class Tick(NamedTuple):
+    """What a datagram from the plant held."""
+
+    time_usec: int | None
+    """Of HIL_SENSOR; None when the datagram had none."""
+    truth: bool
+    """Whether `TickReader.estimate` holds the truth of this tick."""
+    others: list[Frame]
+
+
+class TickReader:
+    """Reads datagrams from the plant of one instance."""
+
+    def __init__(self, instance: int) -> None:
+        self.estimate = np.zeros(STATE_SIZE)
+        """State (18,) of the latest truth, eq. 31, ENU and FLU."""
+        self._systems = (vehicle_system(instance), load_system(instance))
+        data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
+        self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
+        self._header = np.zeros(2, dtype=np.int64)
+        self._view = data.data
+        records = np.zeros(1, dtype=INCOMING)
+        payloads = records.view(np.uint8)
+        self._read = read_tick.bind(data, self._table, records, payloads, self.estimate, self._header)
+
+    def read(self, datagram: bytes) -> Tick:
+        """Everything in a datagram (at most 65536 bytes)."""
+        length = len(datagram)
+        self._view[:length] = datagram
+        found = self._read(length, *self._systems)
+        others: list[Frame] = []
+        if found & OTHERS:
+            rows = self._table[: self._header[0]].tolist()
+            known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID)
+            others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] not in known]
+        truth = bool(found & VEHICLE_TRUTH and found & LOAD_TRUTH)
+        return Tick(int(self._header[1]) if found & TICK else None, truth, others)

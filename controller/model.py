@@ -1,0 +1,76 @@
+"""The linear model at hover: the Jacobian of the equations of motion, written down by hand.
+
+States in the order of eq. 31, inputs [total thrust, M_x, M_y, M_z] (eq. 28 and Appendix F1).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controller.state import STATE_SIZE, WRENCH_SIZE, Array
+from sitl_bridge.vehicle import Vehicle
+
+
+class LinearModel(NamedTuple):
+    """x' = A x + B u, in deviations from hover; A is (18, 18), B is (18, 4)."""
+
+    A: Array
+    B: Array
+
+
+def linear_model(vehicle: Vehicle, length: float | None = None, thrust: float | None = None) -> LinearModel:
+    """Linearise vehicle and load hovering upright, the load straight below.
+
+    length: cable length l in m, thrust: total thrust in N; both by default those of the equilibrium (eqs. 17
+    and 19, corrected). With l = 2 and 196.2 N, which is no equilibrium, this is Appendix F1's printed matrix.
+    """
+    length = vehicle.hover_length if length is None else length
+    thrust = vehicle.hover_thrust if thrust is None else thrust
+    cable, vehicle_mass, load_mass = vehicle.cable, vehicle.airframe.mass, vehicle.load.mass
+    # Sideways the cable is a pendulum's string under its tension, lengthways a spring and damper.
+    string = cable.stiffness * (length - cable.rest_length) / length
+    relative_stiffness = np.diag([string, string, cable.stiffness])
+    relative_damping = np.diag([0.0, 0.0, cable.damping])
+
+    a = np.zeros((STATE_SIZE, STATE_SIZE))
+    a[0:3, 6:9] = np.eye(3)
+    a[3:6, 9:12] = np.eye(3)
+    for rows, mass, sign in ((slice(6, 9), vehicle_mass, 1.0), (slice(9, 12), load_mass, -1.0)):
+        a[rows, 0:3] = -sign * relative_stiffness / mass
+        a[rows, 3:6] = sign * relative_stiffness / mass
+        a[rows, 6:9] = -sign * relative_damping / mass
+        a[rows, 9:12] = sign * relative_damping / mass
+    a[6, 16] = thrust / vehicle_mass  # pitch tilts the thrust forward
+    a[7, 15] = -thrust / vehicle_mass  # roll tilts it to the right
+    a[15:18, 12:15] = np.eye(3)
+
+    b = np.zeros((STATE_SIZE, WRENCH_SIZE))
+    b[8, 0] = 1.0 / vehicle_mass
+    b[12:15, 1:4] = np.diag(1.0 / np.array(vehicle.airframe.inertia))
+    return LinearModel(a, b)
+
+
+def with_rotor_lag(model: LinearModel, time_constant: float) -> LinearModel:
+    """Append the wrench that the rotors give as four states that follow the command with a first-order lag.
+
+    time_constant: s, above 0. The inputs become the commanded wrench.
+    """
+    size = STATE_SIZE + WRENCH_SIZE
+    a = np.zeros((size, size))
+    a[:STATE_SIZE, :STATE_SIZE] = model.A
+    a[:STATE_SIZE, STATE_SIZE:] = model.B
+    a[STATE_SIZE:, STATE_SIZE:] = -np.eye(WRENCH_SIZE) / time_constant
+    b = np.zeros((size, WRENCH_SIZE))
+    b[STATE_SIZE:] = np.eye(WRENCH_SIZE) / time_constant
+    return LinearModel(a, b)
+
+
+def with_integrator(model: LinearModel) -> LinearModel:
+    """Append the integral of the load's position as three states (eq. 55, corrected)."""
+    size = model.A.shape[0]
+    a = np.zeros((size + 3, size + 3))
+    a[:size, :size] = model.A
+    a[size:, 3:6] = np.eye(3)
+    return LinearModel(a, np.vstack([model.B, np.zeros((3, WRENCH_SIZE))]))

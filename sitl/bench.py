@@ -1,0 +1,123 @@
+"""`sitl bench`: how fast it is, beside what it could be. Nothing here judges; the ratios are for people."""
+
+from __future__ import annotations
+
+import json
+import socket
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller.autopilot import Autopilot
+from controller.hil.answers import AnswerWriter
+from controller.reference import setpoint
+from sitl.fly import Pair, watch
+from sitl.roundtrip import round_trip_us
+from sitl_bridge.ids import COMPONENT_AUTOPILOT
+from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle import Vehicle, load_vehicle
+
+RATE_HZ = 250.0
+STEPS = 20_000
+TRIPS = 7_500
+FLIGHT_S = 30.0
+
+
+def free_udp_port() -> int:
+    """A UDP port on loopback that nobody has just now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def physics_step_us(vehicle: Vehicle) -> float:
+    """Time of one RK4 step, us, in runs of a thousand."""
+    world = Simulation(vehicle, RATE_HZ, seed=0).world
+    world.advance(1000)
+    began = time.perf_counter()
+    for _ in range(STEPS // 1000):
+        world.advance(1000)
+    return (time.perf_counter() - began) / STEPS * 1e6
+
+
+def control_step_us(vehicle: Vehicle) -> float:
+    """Time of one control step, us: estimate in, rotor commands out."""
+    autopilot = Autopilot(
+        vehicle, "default", RATE_HZ, lambda start: setpoint((3.0, 5.0, 2.0), start), np.zeros(16)
+    )
+    estimate = np.zeros(18)
+    estimate[2] = vehicle.hover_length
+    autopilot.step(estimate)
+    began = time.perf_counter()
+    for _ in range(STEPS):
+        autopilot.step(estimate)
+    return (time.perf_counter() - began) / STEPS * 1e6
+
+
+def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
+    """Bytes of a tick with truth, and of its answer."""
+    simulation = Simulation(vehicle, RATE_HZ, seed=0)
+    simulation.ask_for_truth(True)
+    simulation.heard()
+    simulation.next_tick()
+    writer = AnswerWriter(0, Packer(1, COMPONENT_AUTOPILOT))
+    writer.controls[:4] = 0.7
+    return len(simulation.datagram()), len(writer.answer(4000, True))
+
+
+def lockstep_flight(scenario: str) -> dict[str, Any]:
+    """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
+    port = free_udp_port()
+    common = ["--scenario", scenario, "--rate", str(RATE_HZ)]
+    plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
+    controller = [*common, "--hil", f"udpin:127.0.0.1:{port}"]
+    outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
+    if outcome.failure:
+        raise RuntimeError(outcome.failure)
+    return outcome.end
+
+
+def launch_to_first_command_s() -> float:
+    """Time from the launch of `sitl fly` to the first rotor command at the plant, s."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "sitl", "fly", "hover", "--duration", "0.1", "--out", folder]
+        command += ["--hil", f"udpout:127.0.0.1:{free_udp_port()}"]
+        launched = time.time()
+        subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+        summary = json.loads((Path(folder) / "summary.json").read_text())
+        return float(summary["first_command_unix_s"]) - launched
+
+
+def bench(repeats: int) -> dict[str, float]:
+    """Medians over so many repeats; progress on standard error."""
+    vehicle = load_vehicle("paper", ["cable.rest_length=10"])
+    sizes = datagram_sizes(vehicle)
+    samples: dict[str, list[float]] = {}
+    for repeat in range(repeats):
+        print(f"bench: {repeat + 1} of {repeats}", file=sys.stderr, flush=True)
+        factor = lockstep_flight("setpoint")["real_time_factor"]
+        measured = {
+            "physics_step_us": physics_step_us(vehicle),
+            "control_step_us": control_step_us(vehicle),
+            "lockstep_tick_us": 1e6 / (factor * RATE_HZ),
+            "round_trip_us": round_trip_us(*sizes, TRIPS),
+            "real_time_factor": factor,
+            "launch_to_first_command_s": launch_to_first_command_s(),
+        }
+        measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
+        for key, value in measured.items():
+            samples.setdefault(key, []).append(value)
+    return {key: statistics.median(values) for key, values in samples.items()}
+
+
+def table(results: dict[str, float]) -> str:
+    """The results for people."""
+    return "\n".join(f"  {key:<32}{value:10.3f}" for key, value in results.items())

@@ -1,0 +1,384 @@
+"""The `sitl` command: `plant`, `controller`, `fly SCENARIO`, `bench`. A flag means the same everywhere."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sitl_bridge.ids import HIL_UDP_PORT, MOST_INSTANCES
+from sitl_bridge.process import Speaker, StopRequest
+from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, vehicle_names
+
+if TYPE_CHECKING:
+    from sitl.scenario import Scenario
+    from sitl_bridge.mavlink.links import Address
+
+DEFAULT_RATE_HZ = 250.0
+DESIGNS = ("default", "paper", "paper-lqr")
+
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+
+def number(low: float, high: float, what: str) -> Callable[[str], float]:
+    """An argument type: a finite number within limits."""
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r}: expected {what}, {low:g} to {high:g}")
+        return value
+
+    return parse
+
+
+def whole(low: int, high: int, what: str) -> Callable[[str], int]:
+    """An argument type: a whole number within limits."""
+
+    def parse(text: str) -> int:
+        if not text.lstrip("-").isdigit() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text!r}: expected {what}, {low} to {high}")
+        return int(text)
+
+    return parse
+
+
+def link_address(text: str) -> Address:
+    """An argument type: the address of a link."""
+    from sitl_bridge.mavlink.links import parse_address
+
+    try:
+        return parse_address(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="sitl",
+        description="A quadrotor with a load on an elastic cable, simulated by one process (the plant) and "
+        "flown by another (the controller) over standard MAVLink on UDP.",
+        epilog="Two terminals, in either order: `sitl plant --scenario setpoint` and "
+        "`sitl controller --scenario setpoint`. Both at once, with a report: `sitl fly setpoint`.",
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    fly = commands.add_parser(
+        "fly",
+        help="launch plant and controller, fly a scenario, report on it",
+        description="Launch plant and controller as two processes, fly a scenario and report on it. "
+        "Exit code 0: the load settled; 1: it did not, or a process failed; 2: the command line is wrong.",
+    )
+    fly.add_argument("scenario", metavar="SCENARIO", help="a scenario's name (see below) or .toml file")
+    fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
+    for add in (_vehicle, _link, _clock, _loop, _control, _run, _output):
+        add(fly)
+    fly.add_argument(
+        "--plant-set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="like --set, but only in the plant: the controller is not told",
+    )
+    fly.set_defaults(run=_fly)
+
+    plant = commands.add_parser(
+        "plant",
+        help="simulate vehicle, cable and load",
+        description="Simulate vehicle, cable and load, and speak PX4's simulator API on the HIL link.",
+    )
+    for add in (_scenario, _vehicle, _link, _clock, _loop, _run, _output, _supervised):
+        add(plant)
+    plant.set_defaults(run=_plant)
+
+    controller = commands.add_parser(
+        "controller",
+        help="fly the vehicle",
+        description="Be the autopilot: answer the plant's ticks with rotor commands.",
+    )
+    for add in (_scenario, _vehicle, _link, _loop, _control, _run, _supervised):
+        add(controller)
+    controller.add_argument(
+        "--json", action="store_true", help="one JSON object on standard output at the end"
+    )
+    controller.set_defaults(run=_controller)
+
+    bench = commands.add_parser(
+        "bench",
+        help="measure speed, and print ratios against the bare round trip",
+        description="Measure the physics step, the control step, the lockstep tick, the real-time factor and "
+        "the launch, beside the bare round trip of such datagrams between two Python processes.",
+    )
+    bench.add_argument("--json", action="store_true", help="one JSON object on standard output")
+    bench.add_argument(
+        "--repeats", type=whole(1, 100, "a number"), default=5, help="measurements of each, for the median"
+    )
+    bench.set_defaults(run=_bench)
+    return parser
+
+
+def _scenario_names() -> list[str]:
+    from sitl.scenario import scenario_names
+
+    return scenario_names()
+
+
+def _scenario(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="take vehicle, overrides, duration and reference from a scenario (without one: hover)",
+    )
+
+
+def _vehicle(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--vehicle", metavar="NAME|FILE", help="vehicle description (default: the scenario's, or paper)"
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="override one value of the vehicle description, as in cable.rest_length=10 (repeatable)",
+    )
+
+
+def _link(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--hil",
+        metavar="ADDRESS",
+        type=link_address,
+        help="HIL link: udpout:HOST:PORT, udpin:…, tcpin:… or tcpout:…; for `fly` the plant's end of it "
+        f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first)",
+    )
+    parser.add_argument(
+        "--instance",
+        metavar="N",
+        type=whole(0, MOST_INSTANCES - 1, "an instance"),
+        default=0,
+        help="number of this vehicle: shifts ports and MAVLink ids (default: 0)",
+    )
+    parser.add_argument(
+        "--drop",
+        metavar="PERCENT",
+        type=number(0, 90, "a percentage"),
+        default=0.0,
+        help="lose so many HIL datagrams each way, seeded",
+    )
+
+
+def _clock(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--clock",
+        choices=("realtime", "lockstep"),
+        default="realtime",
+        help="against the wall clock, or tick by tick with the controller (default: realtime)",
+    )
+    parser.add_argument(
+        "--speed",
+        metavar="X",
+        type=number(1e-3, 1e4, "a factor"),
+        help="with lockstep: at most X times real time (default: as fast as it goes)",
+    )
+    parser.add_argument(
+        "--on-silence",
+        choices=("wait", "continue"),
+        default="wait",
+        help="with lockstep: what to do when a tick stays unanswered after three repeats (default: wait)",
+    )
+
+
+def _loop(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--rate",
+        metavar="HZ",
+        type=number(20, 1000, "ticks a second"),
+        default=DEFAULT_RATE_HZ,
+        help=f"ticks a second; the controller is designed for it (default: {DEFAULT_RATE_HZ:g})",
+    )
+
+
+def _control(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--design",
+        choices=DESIGNS,
+        default="default",
+        help="gain design: re-weighted for margins, the paper's integral LQR, or its LQR without integrator",
+    )
+    parser.add_argument(
+        "--feedback", choices=("truth",), default="truth", help="what the law flies on (default: truth)"
+    )
+
+
+def _run(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--seed",
+        type=whole(0, 2**31 - 1, "a seed"),
+        default=0,
+        help="seed of everything random (default: 0)",
+    )
+    parser.add_argument(
+        "--duration",
+        metavar="S",
+        type=number(0.01, 1e6, "seconds"),
+        help="how long to fly (default: the scenario's, or until stopped)",
+    )
+
+
+def _output(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--out", metavar="DIR", type=Path, help="where to write logs and results")
+    parser.add_argument("--json", action="store_true", help="one JSON object on standard output at the end")
+
+
+def _supervised(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--until-eof",
+        action="store_true",
+        help="stop when standard input ends, and write events (for programs)",
+    )
+
+
+def _hil_address(arguments: argparse.Namespace, kind: Any) -> Address:
+    from sitl_bridge.mavlink.links import Address
+
+    default = Address(kind, "127.0.0.1", HIL_UDP_PORT + arguments.instance)
+    return arguments.hil or default
+
+
+def _what_to_fly(arguments: argparse.Namespace, overrides: Sequence[str]) -> tuple[Vehicle, Scenario | None]:
+    """Vehicle and scenario of `plant` and `controller`."""
+    if arguments.scenario is None:
+        return load_vehicle(arguments.vehicle or "paper", overrides), None
+    from sitl.scenario import load_scenario, scenario_vehicle
+
+    scenario = load_scenario(arguments.scenario)
+    return scenario_vehicle(scenario, arguments.vehicle, overrides), scenario
+
+
+def _plant(arguments: argparse.Namespace) -> int:
+    if arguments.speed is not None and arguments.clock != "lockstep":
+        raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
+    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    from sitl_bridge.plant.run import PlantOptions, run
+
+    speaker = Speaker("plant", events=arguments.until_eof)
+    stop = StopRequest()
+    stop.install(watch_stdin=arguments.until_eof)
+    options = PlantOptions(
+        vehicle=vehicle,
+        hil=_hil_address(arguments, "udpout"),
+        clock=arguments.clock,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        instance=arguments.instance,
+        speed=arguments.speed,
+        duration_s=arguments.duration or (scenario.duration if scenario else None),
+        drop_percent=arguments.drop,
+        on_silence=arguments.on_silence,
+        out=arguments.out,
+    )
+    outcome = run(options, speaker, stop)
+    if arguments.json and not arguments.until_eof:
+        print(json.dumps(outcome, indent=2))
+    return 0
+
+
+def _controller(arguments: argparse.Namespace) -> int:
+    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    from controller.run import ControllerOptions, run
+    from sitl.scenario import Hover
+
+    speaker = Speaker("controller", events=False)
+    stop = StopRequest()
+    stop.install(watch_stdin=arguments.until_eof)
+    reference = scenario.reference if scenario else Hover(kind="hover")
+    options = ControllerOptions(
+        vehicle=vehicle,
+        hil=_hil_address(arguments, "udpin"),
+        design=arguments.design,
+        rate_hz=arguments.rate,
+        path_from=reference.path,
+        instance=arguments.instance,
+        duration_s=arguments.duration,
+        drop_percent=arguments.drop,
+        seed=arguments.seed,
+    )
+    outcome = run(options, speaker, stop)
+    if arguments.json:
+        print(json.dumps(outcome, indent=2))
+    return 0
+
+
+def _fly(arguments: argparse.Namespace) -> int:
+    from sitl.flight import FlightOptions, fly
+    from sitl.report import table
+    from sitl.scenario import load_scenario
+
+    if arguments.speed is not None and arguments.clock != "lockstep":
+        raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
+    options = FlightOptions(
+        scenario_name=arguments.scenario,
+        scenario=load_scenario(arguments.scenario),
+        vehicle=arguments.vehicle,
+        overrides=arguments.set,
+        plant_overrides=arguments.plant_set,
+        hil=_hil_address(arguments, "udpout"),
+        clock=arguments.clock,
+        speed=arguments.speed,
+        on_silence=arguments.on_silence,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        design=arguments.design,
+        feedback=arguments.feedback,
+        duration_s=arguments.duration,
+        drop_percent=arguments.drop,
+        instance=arguments.instance,
+        out=arguments.out
+        or Path("runs") / f"{Path(arguments.scenario).stem}-{time.strftime('%Y%m%d-%H%M%S')}",
+    )
+    stop = StopRequest()
+    stop.install()
+    summary = fly(options, stop)
+    if arguments.json:
+        print(json.dumps(summary, indent=2))
+    else:
+        print(table(summary))
+        for name in sorted(options.out.iterdir()):
+            print(f"  {name}")
+    if stop:
+        return EXIT_INTERRUPTED
+    return 0 if summary["settled"] else EXIT_FAILED
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    from sitl.bench import bench, table
+
+    results = bench(arguments.repeats)
+    print(json.dumps(results, indent=2) if arguments.json else table(results))
+    return 0
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    arguments = build_parser().parse_args(argv)
+    try:
+        code: int = arguments.run(arguments)
+    except DescriptionError as error:
+        print(error, file=sys.stderr)
+        return EXIT_USAGE
+    except OSError as error:
+        print(f"sitl {arguments.command}: {error}", file=sys.stderr)
+        return EXIT_USAGE
+    return code

@@ -1,0 +1,110 @@
+"""One flight: two processes, a progress line, and the report."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sitl.fly import Pair, ProgressLine, watch
+from sitl.scenario import Scenario, scenario_vehicle
+from sitl_bridge.mavlink.links import Address
+from sitl_bridge.process import StopRequest
+
+MIRRORED: dict[str, Any] = {"udpout": "udpin", "udpin": "udpout", "tcpin": "tcpout", "tcpout": "tcpin"}
+"""Kind of the other end of a link."""
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """What `sitl fly` is asked for."""
+
+    scenario_name: str
+    scenario: Scenario
+    vehicle: str | None
+    overrides: Sequence[str]
+    plant_overrides: Sequence[str]
+    hil: Address
+    """The plant's end of the link."""
+    clock: str
+    speed: float | None
+    on_silence: str
+    rate_hz: float
+    seed: int
+    design: str
+    feedback: str
+    duration_s: float | None
+    drop_percent: float
+    instance: int
+    out: Path
+
+    def command_lines(self) -> tuple[list[str], list[str]]:
+        """Arguments of `sitl plant` and of `sitl controller`."""
+        common = ["--scenario", self.scenario_name, "--rate", repr(self.rate_hz)]
+        common += ["--instance", str(self.instance), "--seed", str(self.seed)]
+        if self.vehicle is not None:
+            common += ["--vehicle", self.vehicle]
+        for override in self.overrides:
+            common += ["--set", override]
+        plant = [*common, "--hil", str(self.hil), "--clock", self.clock, "--on-silence", self.on_silence]
+        for override in self.plant_overrides:
+            plant += ["--set", override]
+        if self.speed is not None:
+            plant += ["--speed", repr(self.speed)]
+        if self.duration_s is not None:
+            plant += ["--duration", repr(self.duration_s)]
+        plant += ["--drop", repr(self.drop_percent), "--out", str(self.out)]
+        other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
+        controller = [*common, "--hil", str(other_end), "--design", self.design, "--feedback", self.feedback]
+        return plant, controller
+
+
+def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
+    """Fly; returns the summary, which is also in the output folder. Raises DescriptionError, OSError."""
+    scenario = options.scenario
+    vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
+    scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    options.out.mkdir(parents=True, exist_ok=True)
+    line = ProgressLine(sys.stderr)
+    start = vehicle.initial.load_position
+    reference: list[Any] = []  # made at the first progress event: it needs the autopilot's imports
+
+    def show(event: dict[str, Any]) -> None:
+        import numpy as np
+
+        from sitl.metrics import reference_positions
+
+        if not reference:
+            reference.append(scenario.reference.path(start))
+        load = np.array(event["load_m"])
+        target = reference_positions(reference[0], np.array([event["time_s"]]))[0]
+        x, y, z = event["load_m"]
+        line.show(
+            f"t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
+            f"error {np.linalg.norm(load - target):7.3f} m   {event['real_time_factor']:.2f} x real time"
+        )
+
+    outcome = watch(Pair(*options.command_lines()), stop, show)
+    line.end()
+    if outcome.failure:
+        print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
+    from sitl.report import write_report
+
+    facts = {
+        "scenario": options.scenario_name,
+        "vehicle": vehicle.name,
+        "design": options.design,
+        "feedback": options.feedback,
+        "seed": options.seed,
+        "clock": options.clock,
+        "rate_hz": options.rate_hz,
+        "completed": bool(outcome.end.get("completed")) and not outcome.failure,
+        "failure": outcome.failure,
+        "launch_to_first_command_s": outcome.launch_to_first_command_s,
+        "first_command_unix_s": outcome.first_command_unix_s,
+        **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
+    }
+    path = scenario.reference.path(start)
+    return write_report(options.out, facts, path)

@@ -1,0 +1,96 @@
+"""A scenario: which vehicle flies for how long, and where its load is to be. Small TOML files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+
+from sitl_bridge.vehicle import (
+    Section,
+    Vector,
+    Vehicle,
+    load_vehicle,
+    quantity,
+    read_toml,
+    shipped,
+    validated,
+)
+
+if TYPE_CHECKING:
+    from controller.reference import Path
+
+
+class Hover(Section):
+    """The load stays where it is when the flight begins."""
+
+    kind: Literal["hover"]
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.reference import setpoint
+
+        return setpoint(start, start)
+
+
+class Setpoint(Section):
+    """The load goes to a point and stays."""
+
+    kind: Literal["setpoint"]
+    position: Vector = quantity("m", "world ENU")
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.reference import setpoint
+
+        return setpoint(self.position, start)
+
+
+class Circle(Section):
+    """The load goes round: centre + radius·(sin wt, cos wt, 0)."""
+
+    kind: Literal["circle"]
+    centre: Vector = quantity("m", "world ENU")
+    radius: float = quantity("m", "of the circle", gt=0, le=1e3)
+    angular_rate: float = quantity("rad/s", "w", ge=-10, le=10)
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.reference import circle
+
+        return circle(self.centre, self.radius, self.angular_rate, start)
+
+
+Reference = Annotated[Hover | Setpoint | Circle, Field(discriminator="kind")]
+
+
+class Scenario(Section):
+    """What `sitl fly NAME` flies."""
+
+    description: str = quantity("-", "one line", "")
+    vehicle: str = quantity("-", "name or file of the vehicle")
+    set: tuple[str, ...] = quantity("-", "overrides of the vehicle, KEY=VALUE", ())
+    duration: float | None = quantity("s", "how long it flies; without it, until it is stopped", None, gt=0)
+    reference: Reference
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return shipped(_folder())
+
+
+def load_scenario(name_or_file: str) -> Scenario:
+    """Load a scenario by shipped name or path; raises DescriptionError with a line for each fault."""
+    source, content = read_toml(name_or_file, _folder(), "scenario")
+    return validated(Scenario, content, source)
+
+
+def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
+    """The scenario's vehicle, with what the command line says on top."""
+    return load_vehicle(vehicle or scenario.vehicle, [*scenario.set, *overrides])
+
+
+def _folder() -> Any:
+    return resources.files(__package__) / "scenarios"

@@ -1,0 +1,167 @@
+"""The plant's process: a link, a clock, and one loop that waits for the next datagram or deadline."""
+
+from __future__ import annotations
+
+import gc
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from sitl_bridge.mavlink.links import Address, Link, open_link
+from sitl_bridge.mavlink.loss import LossyLink
+from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.plant.lockstep import Lockstep, OnSilence
+from sitl_bridge.plant.notices import Notices
+from sitl_bridge.plant.realtime import Realtime
+from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.state import LOAD_POSITION
+from sitl_bridge.plant.statelog import FILE_NAME, StateLog
+from sitl_bridge.process import Speaker, StopRequest
+from sitl_bridge.vehicle import Vehicle
+
+TLOG_NAME = "link.tlog"
+REPORT_INTERVAL = 0.2
+"""Between two progress events, s."""
+
+
+@dataclass(frozen=True)
+class PlantOptions:
+    """What a plant is started with."""
+
+    vehicle: Vehicle
+    hil: Address
+    clock: Literal["realtime", "lockstep"]
+    rate_hz: float
+    seed: int
+    instance: int
+    speed: float | None = None
+    duration_s: float | None = None
+    drop_percent: float = 0.0
+    on_silence: OnSilence = "wait"
+    out: Path | None = None
+
+
+class Progress:
+    """When the scenario began and how it goes, in wall time."""
+
+    def __init__(self, speaker: Speaker) -> None:
+        self._speaker = speaker
+        self._next = 0.0
+        self.began_at: float | None = None
+
+    def begin(self) -> None:
+        """The first armed answer is in."""
+        self.began_at = time.monotonic()
+        self._speaker.event("begin", unix_time_s=time.time())
+
+    def report(self, now: float, simulation: Simulation) -> None:
+        """Say how far the scenario is, from time to time."""
+        if now < self._next or self.began_at is None:
+            return
+        self._next = now + REPORT_INTERVAL
+        load = simulation.world.state[LOAD_POSITION].tolist()
+        self._speaker.event(
+            "progress", time_s=simulation.scenario_time, load_m=load, real_time_factor=self.factor(simulation)
+        )
+
+    def factor(self, simulation: Simulation) -> float | None:
+        """Simulated seconds a second, since the scenario began."""
+        if self.began_at is None:
+            return None
+        return simulation.scenario_time / max(1e-9, time.monotonic() - self.began_at)
+
+
+def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
+    """Run a plant until its scenario is over or it is asked to stop; returns what to report of it.
+
+    Raises OSError when the link cannot be opened or a log not written.
+    """
+    progress = Progress(speaker)
+    simulation = Simulation(
+        options.vehicle,
+        options.rate_hz,
+        options.seed,
+        options.instance,
+        options.duration_s,
+        on_begin=progress.begin,
+    )
+    log, tlog = None, None
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+        log = simulation.recorder = StateLog(options.out / FILE_NAME, simulation.world)
+        tlog = TlogWriter(options.out / TLOG_NAME)
+    link = open_link(options.hil, speaker.say)
+    if options.drop_percent:
+        link = LossyLink(link, options.drop_percent, options.seed)
+    notices = Notices(speaker.say)
+    clock: Lockstep | Realtime
+    if options.clock == "lockstep":
+        clock = Lockstep(
+            simulation, notices, options.instance, options.speed, not link.reliable, options.on_silence
+        )
+    else:
+        clock = Realtime(simulation, notices, options.instance)
+    speaker.say(
+        f"{options.vehicle.name}, {options.clock} at {options.rate_hz:g} Hz, "
+        f"waiting for an autopilot on {options.hil} (system {options.instance + 1})"
+    )
+    try:
+        _loop(clock, link, tlog, progress, stop)
+    finally:
+        link.close()
+        if tlog is not None:
+            tlog.close()
+        if log is not None:
+            log.close()
+    if stop:
+        speaker.say(f"stopped by {stop.reason} at t = {simulation.scenario_time:.2f} s")
+    outcome = _outcome(options, clock, progress, stop)
+    speaker.event("end", **outcome)
+    return outcome
+
+
+def _loop(
+    clock: Lockstep | Realtime, link: Link, tlog: TlogWriter | None, progress: Progress, stop: StopRequest
+) -> None:
+    gc.collect()
+    gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
+    epoch = time.time() - time.monotonic()
+    clock.start(time.monotonic())
+    while not clock.finished and not stop:
+        now = time.monotonic()
+        for datagram in clock.to_send(now):
+            link.send(datagram)
+            if tlog is not None:
+                tlog.write(datagram, epoch + now)
+        received = link.receive(clock.next_deadline())
+        if received is not None:
+            now = time.monotonic()
+            clock.receive(received, now)
+            if tlog is not None:
+                tlog.write(received, epoch + now)
+        progress.report(now, clock.simulation)
+
+
+def _outcome(
+    options: PlantOptions, clock: Lockstep | Realtime, progress: Progress, stop: StopRequest
+) -> dict[str, Any]:
+    lateness = np.array(clock.lateness if isinstance(clock, Realtime) else []) * 1e6
+    histogram = {
+        f"p{percent}": float(np.percentile(lateness, percent)) if lateness.size else None
+        for percent in (50, 99)
+    }
+    return {
+        "completed": clock.finished,
+        "stopped_by": stop.reason,
+        "time_s": clock.simulation.scenario_time,
+        "real_time_factor": progress.factor(clock.simulation),
+        "lateness_us": {**histogram, "max": float(lateness.max()) if lateness.size else None},
+        "late_ticks": clock.late_ticks if isinstance(clock, Realtime) else 0,
+        "resent_ticks": clock.resent_ticks if isinstance(clock, Lockstep) else 0,
+        "unanswered_ticks": clock.unanswered_ticks if isinstance(clock, Lockstep) else 0,
+        "state_log": None if options.out is None else str(options.out / FILE_NAME),
+        "tlog": None if options.out is None else str(options.out / TLOG_NAME),
+    }

@@ -1,0 +1,162 @@
+"""The simulation as the HIL link sees it: ticks out, rotor commands in, a scenario in between. No I/O.
+
+The clock (`lockstep`, `realtime`) decides when a tick happens; this decides what happens in it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from pymavlink.dialects.v20 import common
+
+from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
+from sitl_bridge.ids import COMPONENT_TRUTH, vehicle_system
+from sitl_bridge.mavlink.framing import Frame, Packer, decode
+from sitl_bridge.mavlink.hil import ODOMETRY
+from sitl_bridge.plant.messages import TickWriter
+from sitl_bridge.plant.sensing import GPS_RATE_HZ, gps_fix
+from sitl_bridge.plant.world import World
+from sitl_bridge.vehicle import Vehicle
+
+
+class Recorder(Protocol):
+    """Takes the state of each tick of the scenario."""
+
+    def record(self, time_s: float, world: World) -> None:
+        """Keep the world as it is at scenario time `time_s`, with the rotors as commanded from now on."""
+
+
+class Simulation:
+    """One run: freewheeling and held first, then the scenario from the first armed answer on."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        seed: int,
+        instance: int = 0,
+        duration_s: float | None = None,
+        recorder: Recorder | None = None,
+        on_begin: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.rate_hz = rate_hz
+        self.period = 1.0 / rate_hz
+        self.world = World(vehicle, rate_hz, seed)
+        self.tick = 0
+        """Number of the current tick; its `time_usec` is that of tick_time(tick)."""
+        self.ticks_flown = 0
+        """Ticks of the scenario that are over."""
+        self.started = False
+        """Whether the scenario has begun."""
+        self._last_tick = None if duration_s is None else round(duration_s * rate_hz)
+        self._vehicle = vehicle
+        self.recorder = recorder
+        self._on_begin = on_begin
+        self._first_flown = 0
+        self._truth = False
+        self._heard = False
+        home = vehicle.home
+        self._origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
+        self._writer = TickWriter(instance, self._origin, self.world.state, self.world.measurement)
+        self._replies = Packer(vehicle_system(instance), COMPONENT_TRUTH)
+        self._under_way: deque[Sequence[float]] = deque()
+        self._gps_ticks = max(1, round(rate_hz / GPS_RATE_HZ))
+        self._datagram: bytes | None = None
+
+    @property
+    def time_usec(self) -> int:
+        """`time_usec` of the current tick: above 0, and only growing."""
+        return round((self.tick + 1) * MICROSECONDS_PER_SECOND / self.rate_hz)
+
+    @property
+    def scenario_time(self) -> float:
+        """Seconds since the scenario began."""
+        return self.ticks_flown / self.rate_hz
+
+    @property
+    def finished(self) -> bool:
+        """Whether the scenario's duration is over."""
+        return self._last_tick is not None and self.ticks_flown >= self._last_tick
+
+    def datagram(self) -> bytes:
+        """The current tick's frames; the same bytes as often as it is asked for."""
+        if self._datagram is None:
+            self.world.measure(not self.started, self._vehicle.home.altitude)
+            since = self.tick - self._first_flown
+            fix = gps_fix(self.world.state) if since % self._gps_ticks == 0 else None
+            self._datagram = self._writer.datagram(self.time_usec, fix, self._truth and self._heard)
+        return self._datagram
+
+    def heard(self) -> None:
+        """The autopilot has answered a tick; truth, where asked for, goes out from the next tick on.
+
+        So an autopilot that flies on truth arms only when the plant is known to hear its answers, and the
+        step that arms it is the scenario's first.
+        """
+        self._heard = True
+
+    def ask_for_truth(self, wanted: bool) -> None:
+        """Send ODOMETRY of vehicle and load with every tick, or no more."""
+        self._truth = wanted
+
+    def begin(self) -> None:
+        """The scenario begins at the current tick: initial state, fresh random streams."""
+        self.world.reset()
+        self.started = True
+        self._first_flown = self.tick
+        self._under_way.clear()
+        for _ in range(self._vehicle.loop.delay_ticks):
+            self._under_way.append(self.world.trim_controls)
+        self._on_begin()
+
+    def next_tick(self) -> None:
+        """Go on to the next tick while the vehicle is held."""
+        self.tick += 1
+        self._datagram = None
+
+    def step(self, controls: Sequence[float]) -> None:
+        """Fly one tick under the controls that answer it (later by the loop's delay)."""
+        if self._vehicle.loop.delay_ticks:
+            self._under_way.append(controls)
+            controls = self._under_way.popleft()
+        self.world.command(controls)
+        self.record()
+        self.world.advance(self.world.steps_per_tick)
+        self.finish_tick()
+
+    def record(self) -> None:
+        """Record the world at the current tick, with the rotors as they are commanded now."""
+        if self.recorder is not None:
+            self.recorder.record(self.scenario_time, self.world)
+
+    def finish_tick(self) -> None:
+        """The tick is over: the next one is the current one; the scenario's last is recorded too."""
+        self.ticks_flown += 1
+        self.next_tick()
+        if self.finished:
+            self.record()
+
+    def handle(self, frame: Frame) -> bytes | None:
+        """Answer anything else that the autopilot says; the reply, if one is due.
+
+        SET_MESSAGE_INTERVAL for ODOMETRY asks for truth. Everything else that a real autopilot sends a
+        simulator on connecting (HEARTBEAT, an interval for HIL_STATE_QUATERNION) needs no reaction.
+        """
+        if frame.message_id != common.MAVLINK_MSG_ID_COMMAND_LONG:
+            return None
+        command = decode(frame)
+        asked = int(command.param1) if command.param1 == command.param1 else -1
+        if command.command != common.MAV_CMD_SET_MESSAGE_INTERVAL or asked != ODOMETRY.message_id:
+            return None
+        self.ask_for_truth(command.param2 >= 0)
+        acknowledgement: Any = common.MAVLink_command_ack_message(
+            command=command.command,
+            result=common.MAV_RESULT_ACCEPTED,
+            progress=0,
+            result_param2=0,
+            target_system=frame.system,
+            target_component=frame.component,
+        )
+        return self._replies.pack(acknowledgement)

@@ -1,0 +1,114 @@
+"""The state log: a Parquet file with a row for each tick of the scenario."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sitl_bridge.compiled import Buffer, entry_point
+from sitl_bridge.plant.cable import tension
+from sitl_bridge.plant.parameters import MOST_ROTORS, PARAMETERS
+from sitl_bridge.plant.state import COLUMNS, STATE_SIZE, Array
+from sitl_bridge.plant.world import World
+
+FILE_NAME = "state.parquet"
+CHUNK_ROWS = 4096
+
+_TIME, _STATE, _LENGTH, _TENSION = 0, 1, 1 + STATE_SIZE, 2 + STATE_SIZE
+_ROTORS = _TENSION + 1
+_FORCE = _ROTORS + MOST_ROTORS
+_WIDTH = _FORCE + 6
+
+
+def columns(rotor_count: int) -> list[str]:
+    """Names of the log's columns, with their units."""
+    forces = [f"force_{body}_{axis}_N" for body in ("vehicle", "load") for axis in "xyz"]
+    rotors = [f"rotor_{i + 1}_rad_s" for i in range(rotor_count)]
+    return ["time_s", *COLUMNS, "cable_length_m", "cable_tension_N", *rotors, *forces]
+
+
+@entry_point(
+    Buffer(PARAMETERS, (1,)),
+    Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+    Buffer(np.float64, (6,)),
+    Buffer(np.float64, (CHUNK_ROWS, _WIDTH)),
+    int,
+    float,
+)
+def fill_row(
+    record: Any, x: Array, rotor_speed: Array, force: Array, rows: Array, index: int, time_s: float
+) -> int:
+    """Write one row of the log."""
+    row = rows[index]
+    row[_TIME] = time_s
+    for i in range(STATE_SIZE):
+        row[_STATE + i] = x[i]
+    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
+    length = (ex * ex + ey * ey + ez * ez) ** 0.5
+    rate = ((x[16] - x[3]) * ex + (x[17] - x[4]) * ey + (x[18] - x[5]) * ez) / length
+    row[_LENGTH] = length
+    row[_TENSION] = tension(record[0], length, rate)
+    for i in range(MOST_ROTORS):
+        row[_ROTORS + i] = rotor_speed[i]
+    for i in range(6):
+        row[_FORCE + i] = force[i]
+    return index + 1
+
+
+class StateLog:
+    """Collects rows, and writes them in the background in chunks, so that a tick never waits for a disk.
+
+    Values are exact doubles; the same run gives the same bytes.
+    """
+
+    def __init__(self, path: Path, world: World) -> None:
+        self.path = path
+        self._names = columns(len(world.vehicle.rotors))
+        keep = [*range(_ROTORS + len(world.vehicle.rotors)), *range(_FORCE, _WIDTH)]
+        self._keep = np.array(keep)
+        self._rows = np.zeros((CHUNK_ROWS, _WIDTH))
+        self._fill = fill_row.bind(*world.log_sources(), self._rows)
+        self._count = 0
+        self._chunks: queue.SimpleQueue[Array | None] = queue.SimpleQueue()
+        self._failure: Exception | None = None
+        self._writer = threading.Thread(target=self._write_chunks, name="state log", daemon=True)
+        self._writer.start()
+
+    def record(self, time_s: float, world: World) -> None:
+        """Keep one row."""
+        self._count = self._fill(self._count, time_s)
+        if self._count == CHUNK_ROWS:
+            self._flush()
+
+    def close(self) -> None:
+        """Write out everything; raises what went wrong while writing."""
+        if self._count:
+            self._flush()
+        self._chunks.put(None)
+        self._writer.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def _flush(self) -> None:
+        self._chunks.put(self._rows[: self._count, self._keep])
+        self._count = 0
+
+    def _write_chunks(self) -> None:
+        try:
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+
+            schema = pa.schema([(name, pa.float64()) for name in self._names])
+            with pq.ParquetWriter(self.path, schema, compression="zstd", use_dictionary=False) as writer:
+                while (chunk := self._chunks.get()) is not None:
+                    arrays: list[Any] = [pa.array(np.ascontiguousarray(column)) for column in chunk.T]
+                    writer.write_table(pa.table(arrays, schema=schema))
+        except Exception as error:  # handed to the main thread by `close`
+            self._failure = error
+            while self._chunks.get() is not None:
+                pass
