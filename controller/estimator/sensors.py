@@ -214,7 +214,7 @@ def magnetometer(f: Filter, measured: Any) -> None:
     innovation = -math.atan2(fx * y - fy * x, fx * x + fy * y)
     # A world rotation d turns the field's horizontal direction by d_z - f_z (f_x d_x + f_y d_y) / f_h².
     tilt = -fz / level
-    noise = p.sensor_std[MAGNETOMETER] * p.sensor_std[MAGNETOMETER] / level
+    noise = p.sensor_std[MAGNETOMETER] * p.sensor_std[MAGNETOMETER]
     begin(f)
     _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
     m.innovation[MAGNETOMETER, 0] = innovation

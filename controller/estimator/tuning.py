@@ -35,7 +35,7 @@ class Tuning:
     gyroscope_std: float = 0.015
     """rad/s"""
     magnetometer_std: float = 0.05
-    """of each component of the unit vector"""
+    """rad, of heading"""
     barometer_std: float = 0.3
     """m"""
     gps_position_std: Triple = (0.5, 0.5, 0.8)
