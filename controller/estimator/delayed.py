@@ -98,14 +98,14 @@ def load_row(f: Filter, axis: int) -> float:
     if axis == 0:
         row[LOAD], row[LOAD + 1], row[LOAD + 2] = r00, r10, r20
         row[ATTITUDE], row[ATTITUDE + 1], row[ATTITUDE + 2] = 0.0, -bz, by
-        return bx
+        return float(bx)
     if axis == 1:
         row[LOAD], row[LOAD + 1], row[LOAD + 2] = r01, r11, r21
         row[ATTITUDE], row[ATTITUDE + 1], row[ATTITUDE + 2] = bz, 0.0, -bx
-        return by
+        return float(by)
     row[LOAD], row[LOAD + 1], row[LOAD + 2] = r02, r12, r22
     row[ATTITUDE], row[ATTITUDE + 1], row[ATTITUDE + 2] = -by, bx, 0.0
-    return bz
+    return float(bz)
 
 
 @kernel

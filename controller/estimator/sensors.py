@@ -67,7 +67,7 @@ def book(f: Filter, sensor: int, squares: float, degrees: int) -> None:
 def ratio_of(f: Filter, sensor: int, innovation: float, noise: float) -> float:
     """Innovation over its gate for the present row, which is cleared."""
     variance = predicted_variance(f) + noise
-    return abs(innovation) / (f.p.gate[sensor] * math.sqrt(variance))
+    return float(abs(innovation) / (f.p.gate[sensor] * math.sqrt(variance)))
 
 
 @kernel

@@ -106,7 +106,7 @@ def fuse(f: Filter, innovation: float, noise: float) -> float:
         factor = doubled[i] / variance
         for j in range(ERROR_SIZE):
             cov[i, j] -= factor * shared[j]
-    return left * left / variance
+    return float(left * left / variance)
 
 
 @kernel
@@ -120,7 +120,7 @@ def fuse_remembered(f: Filter, index: int, innovation: float, noise: float) -> f
     variance = f.Pzz[index, index] + noise
     left = innovation - f.vectors[CORRECTION_CLONES, index]
     _apply(f, left, variance)
-    return left * left / variance
+    return float(left * left / variance)
 
 
 @kernel

@@ -10,7 +10,7 @@ from sitl_bridge.vehicle import Vehicle
 
 
 def estimated_weights(vehicle: Vehicle) -> Weights:
-    """Weights for feedback from the estimate: what the load does counts, what the vehicle does for it does not.
+    """Weights for feedback from the estimate: the load's place counts, not what the vehicle does for it.
 
     With a Kalman filter in front, the quadratic cost is met best by the gain of that cost, whatever the noise
     (separation); so the cost is what is wanted, the load at its place, and the inputs' price only sets the

@@ -56,6 +56,8 @@ class Sample:
     gps: tuple[float, Array, Array] | None
     """(time it belongs to, position, velocity)"""
     tracker: tuple[float, Array] | None = None
+    state: Array | None = None
+    """the plant's, for tests that add a sensor"""
 
 
 Spoil = Callable[[Sample], None]
@@ -146,6 +148,19 @@ def error_state(world_state: Array, nominal: Array) -> Array:
     )
 
 
+def give(estimator: Estimator, sample: Sample) -> None:
+    """Hand one tick's readings to the estimator."""
+    estimator.imu(sample.accelerometer, sample.gyroscope)
+    if sample.magnetometer is not None:
+        estimator.magnetometer(sample.magnetometer)
+    if sample.altitude is not None:
+        estimator.barometer(sample.altitude)
+    if sample.gps is not None:
+        estimator.gps(*sample.gps)
+    if sample.tracker is not None:
+        estimator.load_seen(sample.tracker[0], sample.tracker[1], (0.05, 0.05, 0.05))
+
+
 def fly(
     vehicle: Vehicle,
     weights: Weights,
@@ -156,16 +171,21 @@ def fly(
     tuning: Tuning | None = None,
     on_truth: bool = True,
     spoil: Spoil | None = None,
+    believed: Vehicle | None = None,
+    in_flight: bool = False,
     reference: Array | None = None,
 ) -> Flight:
     """Fly `duration` seconds and keep the load where it starts; the law flies on truth or on the estimate.
 
     sensors: what the plant's sensors are like; tuning: what the filter assumes, by default the same.
+    believed: the description that the filter has, by default the true one. in_flight: the filter starts when
+    the flight does (the law then flies on truth for the first two seconds).
     """
     sensors = sensors or Sensors()
     like = sensors.tuning
     world = World(vehicle, RATE_HZ, seed)
-    estimator = Estimator(vehicle, PERIOD, tuning or like)
+    estimator = Estimator(believed or vehicle, PERIOD, tuning or like)
+    estimator.reset(in_flight=in_flight)
     reference = np.array(vehicle.initial.load_position) if reference is None else reference
     law = Law(vehicle, weights, reference)
     generator = np.random.default_rng([seed, 6])
@@ -211,34 +231,32 @@ def fly(
             field_strength @ rotation + like.magnetometer_std * noise[k, 6:9],
             state[2] + 0.3 + like.barometer_std * noise[k, 9],
             waiting.pop(0)[1] if waiting and waiting[0][0] == k else None,
+            state=state,
         )
         if spoil and not held:
             sample.time -= HELD_TICKS * PERIOD
             spoil(sample)
-        estimator.imu(sample.accelerometer, sample.gyroscope)
-        if sample.magnetometer is not None:
-            estimator.magnetometer(sample.magnetometer)
-        if sample.altitude is not None:
-            estimator.barometer(sample.altitude)
-        if sample.gps is not None:
-            estimator.gps(*sample.gps)
-        estimator.tick(now)
+            sample.time += HELD_TICKS * PERIOD
+        if not (held and in_flight):
+            give(estimator, sample)
+            estimator.tick(now)
         if held:
             continue
-        if k == HELD_TICKS:
+        if k == HELD_TICKS and not in_flight:
             estimator.take_off()
         row = k - HELD_TICKS
         truth = truth_of(state)
         flight.truth[row] = truth
         flight.estimate[row] = estimator.state()
-        if row % 10 == 0:
+        if row % 10 == 0 and estimator.aligned:
             cov = estimator.error_covariance[np.ix_(NEES_ROWS, NEES_ROWS)]
             error = error_state(state, estimator.nominal)
             flight.nees[row // 10] = error @ np.linalg.solve(cov, error) / len(error)
             load = slice(9, 12)
             flight.load_nees[row // 10] = error[load] @ np.linalg.solve(cov[load, load], error[load]) / 3.0
             flight.std[row // 10] = np.sqrt(np.diag(estimator.covariance()))
-        speeds = law(truth if on_truth else np.array(estimator.state()))
+        blind = in_flight and row < 2.0 * RATE_HZ
+        speeds = law(truth if on_truth or blind else np.array(estimator.state()))
         estimator.command(speeds)
         world.command([*(speeds / law.largest), *[0.0] * (16 - len(speeds))])
         world.advance(world.steps_per_tick)
