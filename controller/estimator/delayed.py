@@ -13,6 +13,7 @@ from typing import Any
 
 from controller.estimator.layout import (
     ATTITUDE,
+    BARO_OFFSET,
     CLONE_FREE,
     CLONE_LOAD,
     CLONE_MOTION,
@@ -20,6 +21,7 @@ from controller.estimator.layout import (
     CLONE_SIZE,
     CLONES,
     ERROR_SIZE,
+    FLYING,
     GPS_POSITION,
     GPS_VELOCITY,
     LOAD,
@@ -31,7 +33,7 @@ from controller.estimator.layout import (
 )
 from controller.estimator.rotation import matrix
 from controller.estimator.sensors import book, passes
-from controller.estimator.update import begin, fuse_remembered, inject
+from controller.estimator.update import CORRECTION, begin, fuse_remembered, inject
 from sitl_bridge.compiled import kernel
 
 
@@ -172,13 +174,47 @@ def gps(f: Filter, given: Any) -> None:
             worst = max(worst, abs(innovation) / (f.p.gate[sensor] * math.sqrt(f.Pzz[k, k] + std * std)))
         if not passes(f, sensor, worst):
             continue
+        if half == 0:
+            _suspect_barometer(f, m.innovation[sensor, 2] / math.sqrt(f.Pzz[base + 2, base + 2] + std * std))
         for axis in range(3):
             std = given.gps_position_std[axis] if half == 0 else given.gps_velocity_std[axis]
             k = base + 3 * half + axis
             squares += fuse_remembered(f, k, m.innovation[sensor, axis], std * std)
+        _slip(f)
         inject(f)
         book(f, sensor, squares, 3)
     forget(f, CLONE_MOTION, given.gps_time)
+
+
+SUSPICION_BLEND = 0.03
+SUSPICION_LIMIT = 0.45
+"""Of the running mean of GPS height innovations (33 fixes), in standard deviations: 3.7 of its own."""
+SUSPECTED_OFFSET_STD = 1.0
+"""m"""
+SMALLEST_SLIP = 0.25
+"""m: what one fix corrects in steady flight stays far below."""
+
+
+@kernel
+def _suspect_barometer(f: Filter, normalised: float) -> None:
+    """Height innovations of GPS that lean to one side: the barometer drifts faster than its model allows."""
+    m = f.m
+    m.height_suspicion += SUSPICION_BLEND * (normalised - m.height_suspicion)
+    if abs(m.height_suspicion) > SUSPICION_LIMIT:
+        m.height_suspicion = 0.0
+        f.P[BARO_OFFSET, BARO_OFFSET] += SUSPECTED_OFFSET_STD**2
+
+
+@kernel
+def _slip(f: Filter) -> None:
+    """Note a jump of the position that the correction to come makes, so that `report` can spread it out."""
+    correction = f.vectors[CORRECTION]
+    square = 0.0
+    for axis in range(3):
+        square += correction[POSITION + axis] ** 2
+    if square > SMALLEST_SLIP**2 and f.m.vehicle_mode == FLYING:
+        for axis in range(3):
+            f.m.slip[axis] += correction[POSITION + axis]
 
 
 @kernel

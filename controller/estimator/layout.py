@@ -149,6 +149,8 @@ MEMORY = np.dtype(
         ("clone_kind", "i8", CLONES),
         ("next_clone", "f8"),
         ("next_load_clone", "f8"),
+        ("slip", "f8", 3),
+        ("height_suspicion", "f8"),
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
         ("nis_sum", "f8", SENSOR_COUNT),

@@ -55,16 +55,48 @@ from controller.estimator.update import set_part
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 MOST_MISSED_TICKS = 50
+SLIP_SPEED = 0.3
+"""m/s, at which a slip fades at most"""
+SLIP_TIME = 1.0
+"""s, its time constant when it is small"""
 
 
 @kernel
-def one_tick(f: Filter, given: Any, out: Array) -> None:
-    """Predict to the tick's time, take in its measurements, and write the estimate `out` (18,)."""
+def report(f: Filter, out: Array) -> None:
+    """Write the estimate (18,) in the order of eq. 31, without the slip.
+
+    The slip is what GPS corrected at a stroke after an outage. It fades at a speed that a law can follow:
+    a step of metres in its feedback would throw the vehicle over.
+    """
+    x, slip = f.x, f.m.slip
+    size = math.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2)
+    fading = min(SLIP_SPEED, size / SLIP_TIME) * f.p.period
+    for i in range(3):
+        if size > 0.0:
+            slip[i] *= 1.0 - fading / size
+        out[POSITION_OUT + i] = x[X_POSITION + i] - slip[i]
+        out[LOAD_OUT + i] = x[X_POSITION + i] + x[X_LOAD + i] - slip[i]
+        out[VELOCITY_OUT + i] = x[X_VELOCITY + i]
+        out[LOAD_VELOCITY_OUT + i] = x[X_VELOCITY + i] + x[X_LOAD_VELOCITY + i]
+        out[BODY_RATES_OUT + i] = x[X_RATES + i]
+    w, i, j, k = x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3]
+    out[EULER_OUT] = math.atan2(2.0 * (w * i + j * k), 1.0 - 2.0 * (i * i + j * j))
+    out[EULER_OUT + 1] = math.asin(max(-1.0, min(1.0, 2.0 * (w * j - k * i))))
+    out[EULER_OUT + 2] = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
+
+
+@entry_point(Buffer(FILTER, (1,)), Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
+def tick(record: Any, measurements: Any, out: Array) -> int:
+    """Predict to the tick's time, take in its measurements, and write the estimate `out` (18,), eq. 31.
+
+    Returns the vehicle's mode.
+    """
+    f, given = record[0], measurements[0]
     p, m = f.p, f.m
     if m.vehicle_mode == ALIGNING:
         align(f, given)
         report(f, out)
-        return
+        return int(m.vehicle_mode)
     ticks = int((given.time - m.time) / p.period + 0.5)
     for _ in range(min(ticks, MOST_MISSED_TICKS)):
         predict(f)
@@ -92,29 +124,7 @@ def one_tick(f: Filter, given: Any, out: Array) -> None:
     elif m.load_mode == LOAD_ON_GROUND:
         load_at_rest(f)
     report(f, out)
-
-
-@kernel
-def report(f: Filter, out: Array) -> None:
-    """Write the estimate (18,) in the order of eq. 31."""
-    x = f.x
-    for i in range(3):
-        out[POSITION_OUT + i] = x[X_POSITION + i]
-        out[LOAD_OUT + i] = x[X_POSITION + i] + x[X_LOAD + i]
-        out[VELOCITY_OUT + i] = x[X_VELOCITY + i]
-        out[LOAD_VELOCITY_OUT + i] = x[X_VELOCITY + i] + x[X_LOAD_VELOCITY + i]
-        out[BODY_RATES_OUT + i] = x[X_RATES + i]
-    w, i, j, k = x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3]
-    out[EULER_OUT] = math.atan2(2.0 * (w * i + j * k), 1.0 - 2.0 * (i * i + j * j))
-    out[EULER_OUT + 1] = math.asin(max(-1.0, min(1.0, 2.0 * (w * j - k * i))))
-    out[EULER_OUT + 2] = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
-
-
-@entry_point(Buffer(FILTER, (1,)), Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
-def tick(record: Any, given: Any, out: Array) -> int:
-    """One tick: `one_tick` on the filter's record; returns the vehicle's mode."""
-    one_tick(record[0], given[0], out)
-    return int(record[0].m.vehicle_mode)
+    return int(m.vehicle_mode)
 
 
 @entry_point(Buffer(FILTER, (1,)), Buffer(np.float64, (MOST_ROTORS,)))
