@@ -13,6 +13,7 @@ from controller.estimator.layout import (
     LOAD,
     LOAD_VELOCITY,
     NOMINAL_SIZE,
+    SENSOR_COUNT,
     STANDING,
     X_ATTITUDE,
     X_BARO_OFFSET,
@@ -61,6 +62,8 @@ def align(f: Filter, given: Any) -> None:
         return
     if not given.has_altitude:
         return
+    for sensor in range(SENSOR_COUNT):
+        m.last_used[sensor] = m.time
     count = float(m.align_count)
     a, b, c = m.align_sum[0], m.align_sum[1], m.align_sum[2]
     roll = math.atan2(b, c)

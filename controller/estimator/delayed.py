@@ -157,6 +157,8 @@ def gps(f: Filter, given: Any) -> None:
     if slot < 0:
         return
     base = slot * CLONE_ROWS
+    if m.time - max(m.last_used[GPS_POSITION], m.last_used[GPS_VELOCITY]) > OUTAGE:
+        m.slip_until = m.time + SLIPPING
     age = given.gps_time - m.clone_time[slot]
     for half in range(2):
         sensor = GPS_POSITION if half == 0 else GPS_VELOCITY
@@ -191,8 +193,10 @@ SUSPICION_LIMIT = 0.45
 """Of the running mean of GPS height innovations (33 fixes), in standard deviations: 3.7 of its own."""
 SUSPECTED_OFFSET_STD = 1.0
 """m"""
-SMALLEST_SLIP = 0.25
-"""m: what one fix corrects in steady flight stays far below."""
+OUTAGE = 1.0
+"""s without an accepted fix, after which corrections slip."""
+SLIPPING = 3.0
+"""s from the first fix after an outage, in which they do."""
 
 
 @kernel
@@ -207,14 +211,11 @@ def _suspect_barometer(f: Filter, normalised: float) -> None:
 
 @kernel
 def _slip(f: Filter) -> None:
-    """Note a jump of the position that the correction to come makes, so that `report` can spread it out."""
-    correction = f.vectors[CORRECTION]
-    square = 0.0
-    for axis in range(3):
-        square += correction[POSITION + axis] ** 2
-    if square > SMALLEST_SLIP**2 and f.m.vehicle_mode == FLYING:
-        for axis in range(3):
-            f.m.slip[axis] += correction[POSITION + axis]
+    """Note what the correction to come moves after an outage, so that `report` can spread it out."""
+    m, correction = f.m, f.vectors[CORRECTION]
+    if m.time < m.slip_until and m.vehicle_mode == FLYING:
+        for i in range(6):
+            m.slip[i] += correction[POSITION + i]
 
 
 @kernel

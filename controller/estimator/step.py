@@ -56,7 +56,7 @@ from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 MOST_MISSED_TICKS = 50
 SLIP_SPEED = 0.3
-"""m/s, at which a slip fades at most"""
+"""m/s (of the velocity: m/s²), at which a slip fades at most"""
 SLIP_TIME = 1.0
 """s, its time constant when it is small"""
 
@@ -69,15 +69,17 @@ def report(f: Filter, out: Array) -> None:
     a step of metres in its feedback would throw the vehicle over.
     """
     x, slip = f.x, f.m.slip
-    size = math.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2)
-    fading = min(SLIP_SPEED, size / SLIP_TIME) * f.p.period
-    for i in range(3):
+    for part in range(2):
+        size = math.sqrt(slip[3 * part] ** 2 + slip[3 * part + 1] ** 2 + slip[3 * part + 2] ** 2)
         if size > 0.0:
-            slip[i] *= 1.0 - fading / size
+            faded = 1.0 - min(SLIP_SPEED / size, 1.0 / SLIP_TIME) * f.p.period
+            for i in range(3 * part, 3 * part + 3):
+                slip[i] *= faded
+    for i in range(3):
         out[POSITION_OUT + i] = x[X_POSITION + i] - slip[i]
         out[LOAD_OUT + i] = x[X_POSITION + i] + x[X_LOAD + i] - slip[i]
-        out[VELOCITY_OUT + i] = x[X_VELOCITY + i]
-        out[LOAD_VELOCITY_OUT + i] = x[X_VELOCITY + i] + x[X_LOAD_VELOCITY + i]
+        out[VELOCITY_OUT + i] = x[X_VELOCITY + i] - slip[3 + i]
+        out[LOAD_VELOCITY_OUT + i] = x[X_VELOCITY + i] + x[X_LOAD_VELOCITY + i] - slip[3 + i]
         out[BODY_RATES_OUT + i] = x[X_RATES + i]
     w, i, j, k = x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3]
     out[EULER_OUT] = math.atan2(2.0 * (w * i + j * k), 1.0 - 2.0 * (i * i + j * j))

@@ -18,7 +18,7 @@ def estimated_weights(vehicle: Vehicle) -> Weights:
     the estimate into motion of the load.
     """
     load, yaw, integral = 1.0, 1.0, 4.5  # m, rad, m s
-    angular, turning, acceleration = 100.0, 20.0, 5.0  # rad/s², rad/s², m/s²
+    angular, turning, acceleration = 50.0, 20.0, 5.0  # rad/s², rad/s², m/s²
     state = np.zeros(STATE_SIZE)
     state[LOAD_POSITION] = load**-2
     state[STATE_SIZE - 1] = yaw**-2
