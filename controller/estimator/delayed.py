@@ -8,7 +8,6 @@ the present: exactly what a filter without delay, but with hindsight, would do.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from controller.estimator.layout import (
@@ -32,7 +31,7 @@ from controller.estimator.layout import (
     Filter,
 )
 from controller.estimator.rotation import matrix
-from controller.estimator.sensors import book, passes
+from controller.estimator.sensors import book, judge, passes
 from controller.estimator.update import CORRECTION, begin, fuse_remembered, inject
 from sitl_bridge.compiled import kernel
 
@@ -172,12 +171,11 @@ def gps(f: Filter, given: Any) -> None:
             else:
                 innovation = given.gps_velocity[axis] - f.z[k]
                 std = given.gps_velocity_std[axis]
-            m.innovation[sensor, axis] = innovation
-            worst = max(worst, abs(innovation) / (f.p.gate[sensor] * math.sqrt(f.Pzz[k, k] + std * std)))
+            worst = max(worst, judge(f, sensor, axis, innovation, f.Pzz[k, k] + std * std))
         if not passes(f, sensor, worst):
             continue
         if half == 0:
-            _suspect_barometer(f, m.innovation[sensor, 2] / math.sqrt(f.Pzz[base + 2, base + 2] + std * std))
+            _suspect_barometer(f, m.normalised[sensor, 2])
         for axis in range(3):
             std = given.gps_position_std[axis] if half == 0 else given.gps_velocity_std[axis]
             k = base + 3 * half + axis
@@ -230,9 +228,9 @@ def tracker(f: Filter, given: Any) -> None:
     begin(f)
     for axis in range(3):
         std = given.tracker_std[axis]
-        m.innovation[TRACKER, axis] = given.tracker[axis] - f.z[base + axis]
+        innovation = given.tracker[axis] - f.z[base + axis]
         variance = f.Pzz[base + axis, base + axis] + std * std
-        worst = max(worst, abs(m.innovation[TRACKER, axis]) / (f.p.gate[TRACKER] * math.sqrt(variance)))
+        worst = max(worst, judge(f, TRACKER, axis, innovation, variance))
     if passes(f, TRACKER, worst):
         for axis in range(3):
             std = given.tracker_std[axis]

@@ -42,6 +42,8 @@ class SensorHealth(NamedTuple):
     """s since a sample was used"""
     nis: float
     """mean normalised innovation squared per degree of freedom since the start; 1 when consistent"""
+    within: float
+    """share of innovations within their 95 % bounds since the start"""
 
 
 class Health(NamedTuple):
@@ -213,6 +215,7 @@ class Estimator:
                 int(m["rejected"][index]),
                 now - float(m["last_used"][index]),
                 float(m["nis_sum"][index]) / count if count else math.nan,
+                float(m["within"][index]) / max(1, int(m["seen"][index])),
             )
 
         def std(part: str, rows: slice) -> float:

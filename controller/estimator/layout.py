@@ -154,6 +154,9 @@ MEMORY = np.dtype(
         ("height_suspicion", "f8"),
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
+        ("normalised", "f8", (SENSOR_COUNT, 3)),
+        ("seen", "i8", SENSOR_COUNT),
+        ("within", "i8", SENSOR_COUNT),
         ("nis_sum", "f8", SENSOR_COUNT),
         ("nis_count", "i8", SENSOR_COUNT),
         ("rejected", "i8", SENSOR_COUNT),
@@ -161,7 +164,11 @@ MEMORY = np.dtype(
         ("last_used", "f8", SENSOR_COUNT),
     ]
 )
-"""What the filter remembers besides state and covariance."""
+"""What the filter remembers besides state and covariance.
+
+innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen, within:
+how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
+"""
 
 INPUT = np.dtype(
     [

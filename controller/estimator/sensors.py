@@ -63,11 +63,27 @@ def book(f: Filter, sensor: int, squares: float, degrees: int) -> None:
     f.m.nis_count[sensor] += degrees
 
 
+NINETY_FIVE = 1.959964
+"""Standard deviations within which 95 % of a normal distribution lie."""
+
+
 @kernel
-def ratio_of(f: Filter, sensor: int, innovation: float, noise: float) -> float:
-    """Innovation over its gate for the present row, which is cleared."""
-    variance = predicted_variance(f) + noise
-    return float(abs(innovation) / (f.p.gate[sensor] * math.sqrt(variance)))
+def judge(f: Filter, sensor: int, axis: int, innovation: float, variance: float) -> float:
+    """Book an innovation of this variance; returns its size as a part of the gate."""
+    m = f.m
+    normalised = innovation / math.sqrt(variance)
+    m.innovation[sensor, axis] = innovation
+    m.normalised[sensor, axis] = normalised
+    m.seen[sensor] += 1
+    if abs(normalised) < NINETY_FIVE:
+        m.within[sensor] += 1
+    return float(abs(normalised) / f.p.gate[sensor])
+
+
+@kernel
+def ratio_of(f: Filter, sensor: int, axis: int, innovation: float, noise: float) -> float:
+    """`judge` for the present row, which is cleared; noise: variance of the measurement itself."""
+    return float(judge(f, sensor, axis, innovation, predicted_variance(f) + noise))
 
 
 @kernel
@@ -86,8 +102,7 @@ def accelerometer(f: Filter, measured: Any) -> None:
     worst, squares = 0.0, 0.0
     for axis in range(3):
         innovation = measured[axis] - _accelerometer_row(f, axis)
-        m.innovation[ACCELEROMETER, axis] = innovation
-        worst = max(worst, ratio_of(f, ACCELEROMETER, innovation, noise))
+        worst = max(worst, ratio_of(f, ACCELEROMETER, axis, innovation, noise))
     if not passes(f, ACCELEROMETER, worst):
         return
     for axis in range(3):
@@ -146,9 +161,8 @@ def gyroscope(f: Filter, measured: Any) -> None:
     worst, squares = 0.0, 0.0
     for axis in range(3):
         innovation = measured[axis] - x[X_RATES + axis] - x[X_GYRO_BIAS + axis]
-        m.innovation[GYROSCOPE, axis] = innovation
         f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
-        worst = max(worst, ratio_of(f, GYROSCOPE, innovation, noise))
+        worst = max(worst, ratio_of(f, GYROSCOPE, axis, innovation, noise))
     # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
     # widens the rates, it does not refuse what the gyroscope sees for long.
     if not passes(f, GYROSCOPE, worst):
@@ -217,8 +231,7 @@ def magnetometer(f: Filter, measured: Any) -> None:
     noise = p.sensor_std[MAGNETOMETER] * p.sensor_std[MAGNETOMETER]
     begin(f)
     _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
-    m.innovation[MAGNETOMETER, 0] = innovation
-    if not passes(f, MAGNETOMETER, ratio_of(f, MAGNETOMETER, innovation, noise)):
+    if not passes(f, MAGNETOMETER, ratio_of(f, MAGNETOMETER, 0, innovation, noise)):
         return
     _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
     squares = fuse(f, innovation, noise)
@@ -250,13 +263,12 @@ def _magnetometer_row(
 @kernel
 def barometer(f: Filter, altitude: float) -> None:
     """Pressure altitude above home, m: height plus the barometer's offset."""
-    p, m = f.p, f.m
+    p = f.p
     noise = p.sensor_std[BAROMETER] * p.sensor_std[BAROMETER]
     innovation = altitude - f.x[X_POSITION + 2] - f.x[X_BARO_OFFSET]
-    m.innovation[BAROMETER, 0] = innovation
     begin(f)
     f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
-    if not passes(f, BAROMETER, ratio_of(f, BAROMETER, innovation, noise)):
+    if not passes(f, BAROMETER, ratio_of(f, BAROMETER, 0, innovation, noise)):
         return
     f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
     squares = fuse(f, innovation, noise)

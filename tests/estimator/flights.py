@@ -76,7 +76,8 @@ class Flight:
     nees: Array
     """(n,) of NEES_ROWS, per degree of freedom, every tenth tick"""
     load_nees: Array
-    innovations: Array = field(default_factory=lambda: np.zeros(0))
+    innovations: list[Array] = field(default_factory=list)
+    """(7, 3) normalised innovations of every sensor, at each GPS fix"""
 
     def load_relative_error(self, skip: float = 20.0) -> Array:
         """Root mean square error of the load relative to the vehicle, (3,) m."""
@@ -245,6 +246,8 @@ def fly(
         if k == HELD_TICKS and not in_flight:
             estimator.take_off()
         row = k - HELD_TICKS
+        if sample.gps is not None:
+            flight.innovations.append(estimator.memory["normalised"].copy())
         truth = truth_of(state)
         flight.truth[row] = truth
         flight.estimate[row] = estimator.state()

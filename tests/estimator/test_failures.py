@@ -1,4 +1,4 @@
-"""What a flight on the estimate survives: lost, jumping, stuck, drifting and saturated sensors, a slack cable."""
+"""What a flight on the estimate survives: lost, jumping, stuck, drifting, saturated sensors; a slack cable."""
 
 import dataclasses
 
@@ -43,7 +43,7 @@ def test_gps_outage(rest_length: float) -> None:
     assert np.linalg.norm(error(flight, 14.9)[0:3]) < 5.0
     # The load is still seen by the accelerometer.
     assert np.all(np.abs(error(flight, 14.9)[3:6] - error(flight, 14.9)[0:3]) < 0.2)
-    assert flight.nees[500:-1].max() < 3.0
+    assert flight.nees[100:-1].max() < 3.0
     assert np.abs(flight.truth[-500:, 3:6]).max() < 0.6
 
 
@@ -62,7 +62,7 @@ def test_gps_jump_is_refused() -> None:
     def jump(sample: Sample) -> None:
         if 5.0 <= sample.time < 10.0 and sample.gps:
             time, position, velocity = sample.gps
-            sample.gps = (time, position + [20.0, 0.0, 0.0], velocity)
+            sample.gps = (time, position + np.array([20.0, 0.0, 0.0]), velocity)
 
     flight = on_estimate(jump)
     assert flight.estimator.memory["rejected"][SENSORS.index("gps_position")] == 50
@@ -82,7 +82,7 @@ def test_magnetometer_stuck() -> None:
     flight = on_estimate(stuck)
     assert flight.estimator.memory["rejected"][SENSORS.index("magnetometer")] > 4900
     assert np.abs(flight.estimate[:, 17] - flight.truth[:, 17]).max() < 0.15
-    assert flight.nees[500:-1].max() < 4.0
+    assert flight.nees[100:-1].max() < 4.0
     assert flight.estimator.health().sensors["magnetometer"].age > 15.0
 
 
@@ -96,7 +96,7 @@ def test_barometer_drift() -> None:
     flight = on_estimate(drift)
     assert np.abs(flight.estimate[:, 2] - flight.truth[:, 2]).max() < 1.0
     relative = (flight.estimate - flight.truth)[:, 3:6] - (flight.estimate - flight.truth)[:, 0:3]
-    assert np.abs(relative).max() < 0.1
+    assert np.abs(relative[500:]).max() < 0.1
 
 
 def test_imu_saturation() -> None:
@@ -108,7 +108,7 @@ def test_imu_saturation() -> None:
 
     flight = on_estimate(saturated, duration=10.0)
     assert flight.estimator.memory["rejected"][SENSORS.index("accelerometer")] == 50
-    assert flight.nees[500:-1].max() < 3.0
+    assert flight.nees[100:-1].max() < 3.0
 
 
 def test_tracker_sharpens_the_load() -> None:
