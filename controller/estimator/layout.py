@@ -166,8 +166,8 @@ MEMORY = np.dtype(
 )
 """What the filter remembers besides state and covariance.
 
-innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen, within:
-how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
+innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
+within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """
 
 INPUT = np.dtype(

@@ -1,4 +1,4 @@
-"""The load without a load sensor: accuracy against the Riccati bound, consistency, and flight on the estimate."""
+"""The load without a load sensor: accuracy against the Riccati bound, consistency, flight on the estimate."""
 
 import functools
 

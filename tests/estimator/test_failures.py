@@ -1,4 +1,4 @@
-"""What a flight on the estimate survives: lost, jumping, stuck, drifting, saturated sensors; a slack cable."""
+"""What a flight survives on the estimate: lost, jumping, stuck or saturated sensors, a slack cable."""
 
 import dataclasses
 
