@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -96,6 +96,79 @@ class Tuning:
 
 CONSUMER = Tuning()
 RTK = replace(CONSUMER, gps_position_std=(0.02, 0.02, 0.03), gps_velocity_std=(0.05, 0.05, 0.05))
+
+
+class Instrument(Protocol):
+    """A sensor of HIL_SENSOR, as the vehicle description has it (noise as density, SI)."""
+
+    noise_density: float
+    bias: float
+    random_walk: float
+    range: float
+    rate: float
+
+
+class Receiver(Protocol):
+    """A GPS receiver, as the vehicle description has it."""
+
+    rate: float
+    horizontal_noise: float
+    vertical_noise: float
+    horizontal_velocity_noise: float
+    vertical_velocity_noise: float
+    horizontal_wander: float
+    vertical_wander: float
+
+
+class Suite(Protocol):
+    """What a vehicle senses with."""
+
+    accelerometer: Any
+    gyroscope: Any
+    magnetometer: Any
+    barometer: Any
+    gps: Any
+    tracker: Any
+
+
+def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> Tuning:
+    """The tuning for a sensor suite of the description at a loop rate.
+
+    field: the magnetic field at home, T, world ENU. more: any other field of Tuning. No sensor is taken for
+    better than a floor: an ideal one would leave the filter nothing to weigh.
+    """
+
+    def std(instrument: Instrument, floor: float) -> float:
+        return max(floor, instrument.noise_density * math.sqrt(instrument.rate or rate_hz))
+
+    accelerometer: Instrument = sensors.accelerometer
+    gyroscope: Instrument = sensors.gyroscope
+    barometer: Instrument = sensors.barometer
+    gps: Receiver = sensors.gps
+    horizontal = max(0.01, math.hypot(gps.horizontal_noise, gps.horizontal_wander))
+    vertical = max(0.01, math.hypot(gps.vertical_noise, gps.vertical_wander))
+    across, up = max(0.01, gps.horizontal_velocity_noise), max(0.01, gps.vertical_velocity_noise)
+    plain = Tuning()
+    return replace(
+        plain,
+        accelerometer_std=std(accelerometer, 0.02),
+        gyroscope_std=std(gyroscope, 1e-3),
+        magnetometer_std=std(sensors.magnetometer, 0.0) / math.hypot(field[0], field[1]) + 1e-3,
+        barometer_std=std(barometer, 0.02),
+        gps_position_std=(horizontal, horizontal, vertical),
+        gps_velocity_std=(across, across, up),
+        accelerometer_range=accelerometer.range or plain.accelerometer_range,
+        gyroscope_range=gyroscope.range or plain.gyroscope_range,
+        field=field,
+        accel_bias_std=max(0.02, 1.5 * accelerometer.bias),
+        gyro_bias_std=max(0.002, 1.5 * gyroscope.bias),
+        accel_bias_walk=max(5e-5, accelerometer.random_walk),
+        gyro_bias_walk=max(2e-6, gyroscope.random_walk),
+        baro_walk=max(plain.baro_walk, barometer.random_walk),
+        gps_period=1.0 / gps.rate,
+        tracker_period=1.0 / sensors.tracker.rate if sensors.tracker is not None else 0.0,
+        **more,
+    )
 
 
 def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
