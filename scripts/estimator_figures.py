@@ -153,9 +153,10 @@ def draw(out: Path) -> None:
     flight = fly(vehicle, weights, 40.0, 3, on_truth=False, spoil=outage)
     outage_figure(flight, 10.0, 20.0, out / "estimator_outage.png")
     flight = fly(vehicle, weights, 60.0, 2)
-    normalised = np.array(flight.innovations[100:])
-    names = ("gps_position", "accelerometer")
-    samples = [(name, normalised[:, SENSORS.index(name)].ravel()) for name in names]
+    samples = [
+        ("GPS position", np.ravel(flight.gps_innovations[100:])),
+        ("accelerometer", np.ravel(flight.accelerometer_innovations[350:])),
+    ]
     innovation_figure(samples, out / "estimator_innovations.png")
 
 

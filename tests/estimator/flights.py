@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.estimator.filter import Estimator
-from controller.estimator.layout import PARTS
+from controller.estimator.layout import ACCELEROMETER, GPS_POSITION, PARTS
 from controller.estimator.tuning import CONSUMER, Tuning
 from controller.lqr import Weights, sampled_gain, sampled_model
 from controller.model import linear_model, with_integrator
@@ -76,8 +76,10 @@ class Flight:
     nees: Array
     """(n,) of NEES_ROWS, per degree of freedom, every tenth tick"""
     load_nees: Array
-    innovations: list[Array] = field(default_factory=list)
-    """(7, 3) normalised innovations of every sensor, at each GPS fix"""
+    gps_innovations: list[Array] = field(default_factory=list)
+    """(3,) normalised innovations of the position, at each fix"""
+    accelerometer_innovations: list[Array] = field(default_factory=list)
+    """(3,) normalised, every seventh tick: out of step with the held force and with GPS"""
 
     def load_relative_error(self, skip: float = 20.0) -> Array:
         """Root mean square error of the load relative to the vehicle, (3,) m."""
@@ -247,7 +249,9 @@ def fly(
             estimator.take_off()
         row = k - HELD_TICKS
         if sample.gps is not None:
-            flight.innovations.append(estimator.memory["normalised"].copy())
+            flight.gps_innovations.append(estimator.memory["normalised"][GPS_POSITION].copy())
+        if row % 7 == 0:
+            flight.accelerometer_innovations.append(estimator.memory["normalised"][ACCELEROMETER].copy())
         truth = truth_of(state)
         flight.truth[row] = truth
         flight.estimate[row] = estimator.state()
