@@ -33,6 +33,12 @@ IN_FLIGHT_TILT_STD = 0.15
 
 
 @kernel
+def _sane(vector: Any) -> bool:
+    """Three numbers, and none of them absurd."""
+    return abs(vector[0]) < 1e6 and abs(vector[1]) < 1e6 and abs(vector[2]) < 1e6
+
+
+@kernel
 def align(f: Filter, given: Any) -> None:
     """Gather samples; when there are enough, and a GPS fix, set the state and start the filter.
 
@@ -40,16 +46,16 @@ def align(f: Filter, given: Any) -> None:
     and the load hangs somewhere below.
     """
     p, m, x = f.p, f.m, f.x
-    if given.has_imu:
+    if given.has_imu and _sane(given.accelerometer) and _sane(given.gyroscope):
         m.align_count += 1
         for axis in range(3):
             m.align_sum[axis] += given.accelerometer[axis]
             m.align_sum[3 + axis] += given.gyroscope[axis]
-    if given.has_magnetometer:
+    if given.has_magnetometer and _sane(given.magnetometer):
         m.align_magnetometer += 1
         for axis in range(3):
             m.align_sum[6 + axis] += given.magnetometer[axis]
-    if given.has_gps:
+    if given.has_gps and _sane(given.gps_position) and _sane(given.gps_velocity):
         m.align_gps = True
         for axis in range(3):
             x[X_POSITION + axis] = given.gps_position[axis]
@@ -60,7 +66,7 @@ def align(f: Filter, given: Any) -> None:
     m.time = given.time
     if m.align_count < p.align_samples or m.align_magnetometer < 1 or not m.align_gps:
         return
-    if not given.has_altitude:
+    if not given.has_altitude or not abs(given.altitude) < 1e6:
         return
     for sensor in range(SENSOR_COUNT):
         m.last_used[sensor] = m.time

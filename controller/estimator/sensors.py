@@ -67,11 +67,17 @@ NINETY_FIVE = 1.959964
 """Standard deviations within which 95 % of a normal distribution lie."""
 
 
+GARBAGE = 1e6
+"""Standard deviations beyond which, and for what is not a number, a sample is no measurement at all."""
+
+
 @kernel
 def judge(f: Filter, sensor: int, axis: int, innovation: float, variance: float) -> float:
     """Book an innovation of this variance; returns its size as a part of the gate."""
     m = f.m
     normalised = innovation / math.sqrt(variance)
+    if not abs(normalised) < GARBAGE:  # also where it is not a number
+        innovation, normalised = 0.0, GARBAGE
     m.innovation[sensor, axis] = innovation
     m.normalised[sensor, axis] = normalised
     m.seen[sensor] += 1
@@ -166,7 +172,7 @@ def gyroscope(f: Filter, measured: Any) -> None:
     # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
     # widens the rates, it does not refuse what the gyroscope sees for long.
     if not passes(f, GYROSCOPE, worst):
-        if m.rejected_in_row[GYROSCOPE] < 3:
+        if m.rejected_in_row[GYROSCOPE] < 3 or worst > 0.01 * GARBAGE:
             return
         for axis in range(3):
             f.P[RATES + axis, RATES + axis] += m.innovation[GYROSCOPE, axis] ** 2

@@ -29,6 +29,8 @@ CONFIRM_TIME = 0.06
 """s: so long the measured pull has to contradict the model."""
 RELEASE_TIME = 1.5
 """s without any pull in the air: a load on its cable would have fallen into it before."""
+IMPOSSIBLE_PULL = 1e3
+"""Of the load's weight; a sensor that shows that, or no number, shows nothing."""
 GROUND_MARGIN = 0.5
 """m: a slack cable with the load this low means that the load lies on the ground."""
 
@@ -40,7 +42,8 @@ def watch(f: Filter, measured: Any) -> None:
     if m.vehicle_mode != FLYING:
         return
     out = f.vectors[0]
-    measured_pull(f, measured, out)
+    if not measured_pull(f, measured, out) < IMPOSSIBLE_PULL * p.load_mass * p.gravity:
+        return
     blend = p.period / PULL_TIME
     for axis in range(3):
         m.pull[axis] += blend * (out[axis] - m.pull[axis])

@@ -111,6 +111,23 @@ def test_imu_saturation() -> None:
     assert flight.nees[100:-1].max() < 3.0
 
 
+def test_garbage_is_no_measurement() -> None:
+    """What is not a number, from every sensor, also during alignment, is refused and leaves no trace."""
+
+    def garbage(sample: Sample) -> None:
+        if 5.0 <= sample.time < 5.1:
+            sample.accelerometer = sample.gyroscope = sample.magnetometer = np.full(3, np.nan)
+            sample.altitude = np.nan
+            if sample.gps:
+                sample.gps = (sample.gps[0], np.full(3, np.nan), np.full(3, np.nan))
+
+    flight = on_estimate(garbage, duration=8.0)
+    assert np.all(np.isfinite(flight.estimate))
+    assert flight.nees[100:-1].max() < 3.0
+    rejected = flight.estimator.memory["rejected"]
+    assert np.all(rejected[[0, 1, 2, 3]] >= 25)
+
+
 def test_tracker_sharpens_the_load() -> None:
     """A camera that sees the load 0.1 s late: better than without, and consistent."""
     vehicle = paper(10.0)
