@@ -35,7 +35,7 @@ IN_FLIGHT_TILT_STD = 0.15
 @kernel
 def _sane(vector: Any) -> bool:
     """Three numbers, and none of them absurd."""
-    return abs(vector[0]) < 1e6 and abs(vector[1]) < 1e6 and abs(vector[2]) < 1e6
+    return bool(abs(vector[0]) < 1e6 and abs(vector[1]) < 1e6 and abs(vector[2]) < 1e6)
 
 
 @kernel

@@ -16,7 +16,6 @@ from controller.estimator.layout import (
     GYRO_BIAS,
     GYROSCOPE,
     LOAD,
-    LOAD_ON_CABLE,
     LOAD_VELOCITY,
     MAGNETOMETER,
     POSITION,
@@ -297,9 +296,3 @@ def measured_pull(f: Filter, measured: Any, out: Array) -> float:
     out[1] = r10 * a + r11 * b + r12 * c
     out[2] = r20 * a + r21 * b + r22 * c
     return math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
-
-
-@kernel
-def hanging(f: Filter) -> bool:
-    """Whether the load is in the air on its cable."""
-    return bool(f.m.vehicle_mode == FLYING and f.m.load_mode == LOAD_ON_CABLE)
