@@ -31,7 +31,8 @@ Allocation = NDArray[np.void]
 def allocation(vehicle: Vehicle) -> Allocation:
     """The allocation of a vehicle as a record of shape (1,).
 
-    Raises ValueError when the rotors cannot give thrust and all three moments independently.
+    Raises ValueError when the rotors cannot give thrust and all three moments independently, or when some
+    rotor would have no share in the thrust, or a negative one.
     """
     record = np.zeros(1, dtype=ALLOCATION)
     p = record[0]
@@ -48,12 +49,30 @@ def allocation(vehicle: Vehicle) -> Allocation:
     if np.linalg.matrix_rank(effect) < WRENCH_SIZE:
         raise ValueError(f"{vehicle.name}: the rotors cannot give thrust and all three moments independently")
     p["inverse"][:count] = np.linalg.pinv(effect)
+    collective = p["inverse"][:count, 0]
+    if np.any(collective <= 1e-6 / count):
+        idle = ", ".join(str(i) for i in np.flatnonzero(collective <= 1e-6 / count))
+        raise ValueError(f"{vehicle.name}: thrust without moments leaves nothing to rotors {idle}")
     return record
 
 
 @kernel
-def _largest_share(p: Any, base: Array, extra: Array) -> float:
-    """Largest s in 0..1 for which every thrust base + s·extra is within its limits (base is)."""
+def _fitting_span(p: Any, extra: Array) -> float:
+    """Largest factor on roll and pitch for which some collective thrust keeps every rotor in its limits."""
+    span = 1.0
+    for i in range(p.rotor_count):
+        for j in range(p.rotor_count):
+            # The collective has to lift rotor i off its lower limit and leave rotor j below its upper one.
+            need = extra[j] / p.inverse[j, 0] - extra[i] / p.inverse[i, 0]
+            room = p.largest_thrust[j] / p.inverse[j, 0]
+            if need * span > room:
+                span = room / need
+    return span
+
+
+@kernel
+def _fitting_share(p: Any, base: Array, extra: Array) -> float:
+    """Largest s in 0..1 for which every thrust base + s·extra (N) is within its limits, as base is."""
     share = 1.0
     for i in range(p.rotor_count):
         if extra[i] > 0.0:
@@ -73,44 +92,25 @@ def allocate(p: Any, wrench: Array, controls: Array, achieved: Array, scratch: A
     """
     base, extra = scratch[0], scratch[1]
     count = p.rotor_count
-    # Roll and pitch, together with the collective thrust that best makes room for them.
-    span = 1.0
+    # Roll and pitch, with a collective thrust that makes room for them.
     for i in range(count):
         extra[i] = p.inverse[i, 1] * wrench[1] + p.inverse[i, 2] * wrench[2]
     span = _fitting_span(p, extra)
     low, high = 0.0, math.inf
     for i in range(count):
-        collective = p.inverse[i, 0]
-        if collective > 0.0:
-            low = max(low, -span * extra[i] / collective)
-            high = min(high, (p.largest_thrust[i] - span * extra[i]) / collective)
+        low = max(low, -span * extra[i] / p.inverse[i, 0])
+        high = min(high, (p.largest_thrust[i] - span * extra[i]) / p.inverse[i, 0])
     thrust = min(max(wrench[0], low), max(high, low))
+    # Then yaw, as far as there is room left; the limits here only catch rounding.
     for i in range(count):
         base[i] = min(max(p.inverse[i, 0] * thrust + span * extra[i], 0.0), p.largest_thrust[i])
         extra[i] = p.inverse[i, 3] * wrench[3]
-    share = _largest_share(p, base, extra)
+    share = _fitting_share(p, base, extra)
     for k in range(WRENCH_SIZE):
         achieved[k] = 0.0
     for i in range(count):
-        lift = base[i] + share * extra[i]
-        controls[i] = math.sqrt(max(0.0, lift) / p.thrust_coefficient[i]) / p.largest_speed[i]
+        lift = min(max(base[i] + share * extra[i], 0.0), p.largest_thrust[i])
+        controls[i] = math.sqrt(lift / p.thrust_coefficient[i]) / p.largest_speed[i]
         for k in range(WRENCH_SIZE):
             achieved[k] += p.effect[k, i] * lift
     return span < 1.0 or share < 1.0 or thrust != wrench[0]
-
-
-@kernel
-def _fitting_span(p: Any, extra: Array) -> float:
-    """Largest factor on roll and pitch for which some collective thrust keeps every rotor in its limits."""
-    span = 1.0
-    for i in range(p.rotor_count):
-        for j in range(p.rotor_count):
-            ci, cj = p.inverse[i, 0], p.inverse[j, 0]
-            if ci <= 0.0 or cj <= 0.0:
-                continue
-            # The collective has to lift rotor i off its lower limit and leave rotor j below its upper one.
-            need = extra[j] / cj - extra[i] / ci
-            room = p.largest_thrust[j] / cj
-            if need * span > room:
-                span = room / need
-    return span

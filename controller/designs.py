@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy import linalg
 
 from controller.flatness import body
 from controller.law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
-from controller.lqr import SampledGain, Weights, sampled_gain, sampled_model
-from controller.model import LinearModel, linear_model, with_integrator
-from controller.state import STATE_SIZE, WRENCH_SIZE
+from controller.lqr import Weights, sampled_gain, sampled_model
+from controller.model import actuated_model, rotor_time_constant, with_integrator
+from controller.state import (
+    BODY_RATES,
+    EULER_ANGLES,
+    LOAD_POSITION,
+    LOAD_VELOCITY,
+    STATE_SIZE,
+    VEHICLE_POSITION,
+    VEHICLE_VELOCITY,
+    WRENCH_SIZE,
+)
 from sitl_bridge.vehicle import Vehicle
 
 DESIGNS = ("default", "paper", "paper-lqr")
@@ -32,18 +43,21 @@ def default_weights(vehicle: Vehicle) -> Weights:
     """Weights by largest acceptable deviation (Bryson's rule), the inputs scaled to the vehicle.
 
     Moments are weighed as angular accelerations and thrust as an acceleration of the whole, so that the
-    bandwidth, and with it the delay margin, is the same for every size of vehicle.
+    bandwidth, and with it the delay margin, is much the same for every size of vehicle.
     """
+    nowhere = 1e3  # m: the vehicle's own position matters only through the load's
     position, velocity, integral = 0.5, 0.5, 0.6  # m, m/s, m s
     rate, tilt, yaw = 2.0, 0.5, 0.5  # rad/s, rad, rad
     acceleration, angular, turning = 2.0, 15.0, 4.0  # m/s², rad/s², rad/s²
-    scales = np.array(
-        [1e3] * 3 + [position] * 3 + [velocity] * 6 + [rate, rate, rate] + [tilt, tilt, yaw] + [integral] * 3
-    )
-    inertia = np.array(vehicle.airframe.inertia)
+    deviations = np.zeros(STATE_SIZE + 3)
+    deviations[VEHICLE_POSITION], deviations[LOAD_POSITION] = nowhere, position
+    deviations[VEHICLE_VELOCITY] = deviations[LOAD_VELOCITY] = velocity
+    deviations[BODY_RATES], deviations[EULER_ANGLES] = rate, (tilt, tilt, yaw)
+    deviations[STATE_SIZE:] = integral
     mass = vehicle.airframe.mass + vehicle.load.mass
-    inputs = np.array([mass * acceleration, *(inertia * [angular, angular, turning])])
-    return Weights(np.diag(scales**-2.0), np.diag(inputs**-2.0))
+    inertia = np.array(vehicle.airframe.inertia)
+    efforts = np.array([mass * acceleration, *(inertia * (angular, angular, turning))])
+    return Weights(np.diag(deviations**-2.0), np.diag(efforts**-2.0))
 
 
 def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
@@ -51,50 +65,52 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
 
     The loop's delay is the vehicle description's `loop.delay_ticks`. Raises ValueError for an unknown name.
     """
-    if name == "paper":
-        return _integral_design(vehicle, rate_hz, paper_weights(), INTEGRATOR)
     if name == "default":
-        return _integral_design(vehicle, rate_hz, default_weights(vehicle), FEEDFORWARD)
+        return design_for(vehicle, rate_hz, default_weights(vehicle), FEEDFORWARD)
+    if name == "paper":
+        return design_for(vehicle, rate_hz, paper_weights(), INTEGRATOR)
     if name == "paper-lqr":
-        return _plain_design(vehicle, rate_hz, paper_lqr_weights())
+        return design_for(vehicle, rate_hz, paper_lqr_weights(), STATE)
     raise ValueError(f"no design {name!r}; expected one of {', '.join(DESIGNS)}")
 
 
-def actuated_model(vehicle: Vehicle) -> LinearModel:
-    """The linear model from commanded wrench on, with the rotors' lag where they have one."""
-    return linear_model(vehicle)
+def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int) -> Design:
+    """The design that minimises a cost in the sampled loop of a vehicle: a record of shape (1,).
 
-
-def _integral_design(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int) -> Design:
-    model = with_integrator(linear_model(vehicle))
-    gain = sampled_gain(sampled_model(model, weights, 1.0 / rate_hz), vehicle.loop.delay_ticks)
-    record = _record(vehicle, rate_hz, gain, entry)
-    integral_gain = gain.state[:, -3:]
-    record["integral_gain"] = integral_gain
-    record["anti_windup"] = -np.linalg.pinv(integral_gain) / (ANTI_WINDUP_TIME * rate_hz)
-    return record
-
-
-def _plain_design(vehicle: Vehicle, rate_hz: float, weights: Weights) -> Design:
-    gain = sampled_gain(
-        sampled_model(linear_model(vehicle), weights, 1.0 / rate_hz), vehicle.loop.delay_ticks
-    )
-    return _record(vehicle, rate_hz, gain, STATE)
-
-
-def _record(vehicle: Vehicle, rate_hz: float, gain: SampledGain, entry: int) -> Design:
-    record = np.zeros(1, dtype=DESIGN)
-    delay = len(gain.past)
+    weights: Q (18, 18), or (21, 21) with the integral of the load's position, and R (4, 4).
+    entry: how the reference enters, see `law`.
+    """
+    period, delay = 1.0 / rate_hz, vehicle.loop.delay_ticks
     assert delay <= LONGEST_DELAY
-    record["entry"] = entry
-    record["period"] = 1.0 / rate_hz
-    record["delay"] = delay
-    record["lead_time"] = (delay + 0.5) / rate_hz
+    model = actuated_model(vehicle)
+    size = model.A.shape[0]
+    lag, integral = slice(STATE_SIZE, size), slice(size, size + len(weights.Q) - STATE_SIZE)
+    if integral.stop > size:
+        model = with_integrator(model)
+    gain = sampled_gain(sampled_model(model, _with_lag(weights, size), period), delay)
+
+    record = np.zeros(1, dtype=DESIGN)
+    record["entry"], record["period"], record["delay"] = entry, period, delay
     record["state_gain"] = gain.state[:, :STATE_SIZE]
     record["past_gain"][0, :delay] = gain.past
-    hover = np.zeros(STATE_SIZE)
-    hover[2] = vehicle.hover_length
-    record["hover_state"] = hover
+    time_constant = rotor_time_constant(vehicle)
+    # A command acts, on average over its period, half a period after the delay; lagging rotors later still.
+    record["lead_time"] = (delay + 0.5) * period + time_constant
+    if time_constant > 0.0:
+        record["lag_gain"] = gain.state[:, lag]
+        record["lag_decay"] = math.exp(-period / time_constant)
+    if integral.stop > size:
+        integral_gain = gain.state[:, integral]
+        record["integral_gain"] = integral_gain
+        record["anti_windup"] = -np.linalg.pinv(integral_gain) * period / ANTI_WINDUP_TIME
+    record["hover_state"][0, VEHICLE_POSITION] = (0.0, 0.0, vehicle.hover_length)
     record["hover_wrench"][0, 0] = vehicle.hover_thrust
     record["body"] = body(vehicle)
     return record
+
+
+def _with_lag(weights: Weights, size: int) -> Weights:
+    """Weights for a model of `size` states before the integral: what lagging rotors give costs nothing."""
+    state, integral = weights.Q[:STATE_SIZE, :STATE_SIZE], weights.Q[STATE_SIZE:, STATE_SIZE:]
+    lag = np.zeros((size - STATE_SIZE, size - STATE_SIZE))
+    return Weights(linalg.block_diag(state, lag, integral), weights.R)

@@ -1,11 +1,12 @@
 """The control law: integral LQR on the load's position, one pure step.
 
 u = u* - K·[x - x*; v] - sum of K_past·(u_past - u*_past), v = the integral of (p_p - p_ref): eqs. 54 to 56,
-corrected, with the loop's delay. It knows nothing of HIL: an estimate and a reference go in, thrust and
-moments come out.
+corrected, with the loop's delay; where rotors lag, also - K_lag·(what they give now - u*). It knows nothing
+of HIL: an estimate and a reference go in, thrust and moments come out.
 
-Two ways for the reference to enter (errata.md, "What is not said"): through the integrator alone, x* staying
-where the vehicle was when the law was engaged (the paper's), or as a feasible motion that moves x* and u*.
+The reference enters through the integrator alone, x* staying where the vehicle was when the law was engaged
+(the paper's integral LQR: with a raw step that moved x* it would diverge), as a feasible motion that moves x*
+and u*, or, without an integrator, as x* itself.
 """
 
 from __future__ import annotations

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.state import STATE_SIZE, WRENCH_SIZE, Array
+from controller.state import LOAD_POSITION, STATE_SIZE, WRENCH_SIZE, Array
 from sitl_bridge.vehicle import Vehicle
 
 
 class LinearModel(NamedTuple):
-    """x' = A x + B u, in deviations from hover; A is (18, 18), B is (18, 4)."""
+    """x' = A x + B u, in deviations from hover; A (n, n), B (n, 4), n = 18 unless states are appended."""
 
     A: Array
     B: Array
@@ -52,6 +52,21 @@ def linear_model(vehicle: Vehicle, length: float | None = None, thrust: float | 
     return LinearModel(a, b)
 
 
+def actuated_model(vehicle: Vehicle) -> LinearModel:
+    """The model at hover from the commanded wrench on: with the lag of the rotors, if they have one."""
+    time_constant = rotor_time_constant(vehicle)
+    model = linear_model(vehicle)
+    return with_rotor_lag(model, time_constant) if time_constant > 0.0 else model
+
+
+def rotor_time_constant(vehicle: Vehicle) -> float:
+    """Time constant of the wrench that the rotors give, s; 0 without lag, the mean where rotors differ.
+
+    Near hover thrust is linear in rotor speed, so the wrench lags its command as the speeds lag theirs.
+    """
+    return sum(rotor.time_constant for rotor in vehicle.rotors) / len(vehicle.rotors)
+
+
 def with_rotor_lag(model: LinearModel, time_constant: float) -> LinearModel:
     """Append the wrench that the rotors give as four states that follow the command with a first-order lag.
 
@@ -72,5 +87,5 @@ def with_integrator(model: LinearModel) -> LinearModel:
     size = model.A.shape[0]
     a = np.zeros((size + 3, size + 3))
     a[:size, :size] = model.A
-    a[size:, 3:6] = np.eye(3)
+    a[size:, LOAD_POSITION] = np.eye(3)
     return LinearModel(a, np.vstack([model.B, np.zeros((3, WRENCH_SIZE))]))

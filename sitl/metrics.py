@@ -49,7 +49,7 @@ def overshoot_pct(load: Array, start: Array, target: Array) -> float | None:
         step = target[axis] - start[axis]
         if abs(step) > SETTLED_DISTANCE:
             beyond = float(np.max((load[:, axis] - target[axis]) * np.sign(step)))
-            worst = max(worst or 0.0, 100.0 * beyond / abs(step))
+            worst = max(worst or 0.0, 100.0 * beyond / float(abs(step)))
     return worst
 
 

@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from sitl_bridge.vehicle import (
-    Section,
-    Vector,
-    Vehicle,
-    load_vehicle,
-    quantity,
-    read_toml,
-    shipped,
-    validated,
-)
+from sitl_bridge.schema import Section, Vector, quantity
+from sitl_bridge.vehicle import Vehicle, load_vehicle, read_toml, shipped, validated
 
 if TYPE_CHECKING:
     from controller.reference import Path

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import os
 import pkgutil
+from concurrent.futures import ThreadPoolExecutor
 
 import controller
 import sitl_bridge
@@ -23,5 +25,6 @@ def modules() -> list[str]:
 
 
 if __name__ == "__main__":
-    for name in modules():
-        load(name)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # each compiles in a process of its own
+        for result in [pool.submit(load, name) for name in modules()]:
+            result.result()

@@ -1,8 +1,13 @@
 """Machine code for the few functions that run at every tick, without a compiler's start-up in every flight.
 
 Numba compiles, but importing and initialising it takes over a second, more than a whole flight needs to
-start. So it works once, in a process of its own, and leaves an object file in a cache; a flight only loads
+start. So it works once, in a process of its own, and its machine code goes into a cache; a flight only loads
 that file (milliseconds) through llvmlite, and calls it through ctypes (less than a microsecond).
+
+A cache entry is one file that appears whole or not at all, with the digests of everything it was made from;
+its name holds the machine and the versions it was made for, so that environments which share a directory do
+not overwrite each other's. Code is loaded only from next to the sources (whoever writes there can change
+them too) and from directories that belong to the user and nobody else can write.
 
 Two decorators mark what is compiled:
 
@@ -21,10 +26,12 @@ import hashlib
 import importlib
 import json
 import os
+import stat
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -36,8 +43,18 @@ from numpy.typing import NDArray
 
 _COMPILING = "SITL_BRIDGE_COMPILING"  # set in the environment of the process that compiles
 _ROOT = Path(__file__).resolve().parent.parent
-_LIBM = {"pow", "sin", "cos", "tan", "sqrt", "exp", "log", "atan2", "asin", "acos", "atan", "fmod", "sincos"}
+_LIBM = {
+    name + suffix
+    for name in (
+        *("sqrt", "cbrt", "hypot", "pow", "exp", "exp2", "expm1", "log", "log2", "log10", "log1p"),
+        *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "sincos"),
+        *("fmod", "floor", "ceil", "trunc", "rint", "nearbyint", "round"),
+    )
+    for suffix in ("", "f")
+}
 _MEMORY = {"memcpy", "memset", "memmove"}
+# Other packages whose contents end up in machine code: the compiler's, and constants of the dialect.
+_FOREIGN = ("numba._version", "pymavlink.dialects.v20.common")
 
 
 class Buffer(NamedTuple):
@@ -85,8 +102,11 @@ class EntryPoint:
     def bind(self, *arrays: NDArray[Any]) -> Callable[..., Any]:
         """Fix the array arguments; the result takes the scalars and costs little to call.
 
-        Raises TypeError for an array of another type, shape or layout than declared.
+        Raises TypeError for an array of another type, shape or layout than declared, or that is read-only.
         """
+        buffers = sum(isinstance(argument, Buffer) for argument in self.arguments)
+        if len(arrays) != buffers:
+            raise TypeError(f"{self.name}: {len(arrays)} arrays, expected {buffers}")
         addresses = [self._address(index, array) for index, array in enumerate(arrays)]
         bound = _Bound(self._load(), *addresses)
         bound.arrays = arrays  # keep alive what the addresses point to
@@ -99,15 +119,14 @@ class EntryPoint:
 
     def _address(self, index: int, array: NDArray[Any]) -> int:
         declared = self.arguments[index]
-        if (
-            not isinstance(declared, Buffer)
-            or array.dtype != np.dtype(declared.dtype)
-            or array.shape != declared.shape
-            or not array.flags.c_contiguous
-        ):
+        if not isinstance(array, np.ndarray):
+            raise TypeError(f"{self.name}: argument {index} is {type(array).__name__}, expected {declared}")
+        if array.dtype != np.dtype(declared.dtype) or array.shape != declared.shape:
             raise TypeError(
-                f"{self.name}: argument {index} is {array.dtype}{array.shape}, expected contiguous {declared}"
+                f"{self.name}: argument {index} is {array.dtype}{array.shape}, expected {declared}"
             )
+        if not array.flags.carray:
+            raise TypeError(f"{self.name}: argument {index} is not contiguous, aligned and writeable")
         return int(array.ctypes.data)
 
     def _load(self) -> Any:
@@ -116,6 +135,8 @@ class EntryPoint:
             kinds: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double}
             types = [ctypes.c_void_p if isinstance(a, Buffer) else kinds[a] for a in self.arguments]
             address = _engine(module).get_function_address(_symbol(module, self.name))
+            if not address:  # calling it would crash
+                raise RuntimeError(f"{module} has no entry point {self.name} at module level")
             self._function = ctypes.CFUNCTYPE(kinds[self.returns], *types)(address)
         return self._function
 
@@ -177,56 +198,116 @@ def _symbol(module: str, name: str) -> str:
 
 def _machine() -> str:
     features = llvm.get_host_cpu_features().flatten()
-    return f"{llvmlite.__version__} {llvm.get_process_triple()} {llvm.get_host_cpu_name()} {features}"
+    versions = f"{sys.implementation.cache_tag} numpy {np.__version__} llvmlite {llvmlite.__version__}"
+    return f"{versions} {llvm.get_process_triple()} {llvm.get_host_cpu_name()} {features}"
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _file_name(module: str) -> str:
+    """Of the cache entry of a module, for this machine and this place of the sources."""
+    return f"{module}.{_digest(f'{_ROOT} {_machine()}'.encode())[:16]}.native"
 
 
 def _cache_directories() -> list[Path]:
+    """Where cache entries may be, the preferred first; all but the first have to be private."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    return [_ROOT / "sitl_bridge" / "__pycache__", Path(home) / "sitl-bridge", Path(tempfile.gettempdir())]
+    of_user = Path(tempfile.gettempdir()) / f"sitl-bridge-{os.getuid()}"
+    directories = [_ROOT / "sitl_bridge" / "__pycache__", Path(home) / "sitl-bridge", of_user]
+    return [directory for directory in directories if directory.is_absolute()]
 
 
-def _valid_object(directory: Path, module: str) -> bytes | None:
-    """The cached object file, if it was made on such a machine from these very sources."""
+def _trusted(directory: Path) -> bool:
+    """Whether nobody but this user, or who can change the sources anyhow, can have put code there."""
+    if directory.parent == Path(__file__).resolve().parent:
+        return True
+    status = directory.lstat()
+    shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not shared
+
+
+def _packed(code: bytes, sources: dict[str, str]) -> bytes:
+    """A cache entry: one line of JSON, then the object file."""
+    header = {"machine": _machine(), "sha256": _digest(code), "sources": sources}
+    return json.dumps(header).encode() + b"\n" + code
+
+
+def _valid_code(entry: bytes) -> bytes | None:
+    """The object file of a cache entry, if it is whole and made on such a machine from these very sources."""
+    line, _, code = entry.partition(b"\n")
     try:
-        manifest = json.loads((directory / f"{module}.native.json").read_text())
-        fresh = manifest["machine"] == _machine() and all(
-            _digest(_ROOT / name) == digest for name, digest in manifest["sources"].items()
+        header = json.loads(line)
+        fresh = (
+            header["machine"] == _machine()
+            and header["sha256"] == _digest(code)
+            and all(_digest(Path(file).read_bytes()) == seen for file, seen in header["sources"].items())
         )
-        code = (directory / manifest["object"]).read_bytes() if fresh else b""
-        return code if hashlib.sha256(code).hexdigest() == manifest["sha256"] else None
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
+    return code if fresh else None
 
 
 def _cached_object(module: str) -> bytes:
-    """Machine code of a module's entry points: from the cache, or compiled now in a process of its own."""
-    directories = _cache_directories()
-    for directory in directories:
-        if code := _valid_object(directory, module):
-            return code
-    print(f"compiling {module}, once", file=sys.stderr, flush=True)
-    for directory in directories:
+    """Machine code of a module's entry points: from the cache, or compiled now."""
+    for directory in _cache_directories():
         try:
-            directory.mkdir(parents=True, exist_ok=True)
+            entry = (directory / _file_name(module)).read_bytes() if _trusted(directory) else b""
         except OSError:
             continue
-        if os.access(directory, os.W_OK):
-            break
-    command = [sys.executable, "-c", f"from {__name__} import build; build({module!r}, {str(directory)!r})"]
-    environment = {**os.environ, _COMPILING: "1", "PYTHONPATH": os.pathsep.join([str(_ROOT), *sys.path])}
-    outcome = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    code = _valid_object(directory, module)
-    if outcome.returncode != 0 or code is None:
-        raise RuntimeError(f"compiling {module} failed:\n{outcome.stderr}")
+        if code := _valid_code(entry):
+            return code
+    print(f"compiling {module}, once", file=sys.stderr, flush=True)
+    entry = _compile(module)
+    code = _valid_code(entry)
+    if code is None:
+        raise RuntimeError(f"compiling {module} failed: its sources changed meanwhile")
+    if not any(_stored(directory, _file_name(module), entry) for directory in _cache_directories()):
+        print(f"no place to keep the compiled {module}: each start compiles it", file=sys.stderr, flush=True)
     return code
 
 
-def build(module: str, directory: str) -> None:
-    """Compile every entry point of a module into one object file; runs in the process that compiles."""
+def _stored(directory: Path, name: str, entry: bytes) -> bool:
+    """Put a cache entry in place, whole or not at all: two processes may do so at once."""
+    temporary = directory / f".{name}.{os.getpid()}"
+    try:
+        directory.mkdir(mode=0o755, parents=True, exist_ok=True)
+        if not _trusted(directory):
+            return False
+        temporary.touch(mode=0o644)
+        temporary.write_bytes(entry)
+        temporary.replace(directory / name)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink()
+        return False
+    return True
+
+
+def _compile(module: str) -> bytes:
+    """Have a process of its own compile a module; returns the cache entry."""
+    if os.environ.get(_COMPILING):
+        raise RuntimeError(f"an entry point of {module} is called while a module is imported")
+    # The same path as here and, with -P, nothing in front of it; NUMBA_… would change what is compiled.
+    command = [sys.executable, "-P", "-c", f"from {__name__} import build; build({module!r})"]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    environment |= {_COMPILING: "1", "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
+    outcome = subprocess.run(
+        command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, check=False
+    )
+    if outcome.returncode != 0:
+        raise RuntimeError(f"compiling {module} failed:\n{outcome.stderr.decode(errors='replace')}")
+    return outcome.stdout
+
+
+def build(module: str) -> None:
+    """Compile every entry point of a module, write the cache entry to standard output.
+
+    Runs in the process that compiles.
+    """
+    output = os.dup(1)
+    os.dup2(2, 1)  # whatever else is printed is none of the entry
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     machine = llvm.Target.from_default_triple().create_target_machine(
@@ -236,34 +317,24 @@ def build(module: str, directory: str) -> None:
         jit=True,
         codemodel="jitdefault",
     )
-    whole: Any = None
-    for value in list(vars(importlib.import_module(module)).values()):
-        if isinstance(value, EntryPoint) and value.python.__module__ == module:
-            part = _self_contained(value, machine)
-            if whole is None:
-                whole = part
-            else:
-                whole.link_in(part)
-    code = bytes(machine.emit_object(whole))
-    sources = {}
-    for loaded in list(sys.modules.values()):
-        file = getattr(loaded, "__file__", None)
-        if file and Path(file).resolve().is_relative_to(_ROOT) and file.endswith(".py"):
-            relative = Path(file).resolve().relative_to(_ROOT)
-            if relative.parts[0] in ("sitl_bridge", "controller"):
-                sources[str(relative)] = _digest(_ROOT / relative)
-    name = f"{module}.native.{hashlib.sha256(code).hexdigest()[:16]}.o"
-    manifest = {
-        "machine": _machine(),
-        "object": name,
-        "sha256": hashlib.sha256(code).hexdigest(),
-        "sources": sources,
+    values = vars(importlib.import_module(module)).values()
+    entries = {v.name: v for v in values if isinstance(v, EntryPoint) and v.python.__module__ == module}
+    whole = llvm.parse_assembly("")
+    for entry in entries.values():
+        whole.link_in(_self_contained(entry, machine))
+    with open(output, "wb") as standard_output:
+        standard_output.write(_packed(bytes(machine.emit_object(whole)), _sources(module)))
+
+
+def _sources(module: str) -> dict[str, str]:
+    """Digests of the files that the machine code was made from."""
+    packages = {__name__.partition(".")[0], module.partition(".")[0]}
+    files = {
+        getattr(loaded, "__file__", None)
+        for name, loaded in list(sys.modules.items())
+        if name.partition(".")[0] in packages or name in _FOREIGN
     }
-    # Two processes may compile at once: each file appears whole or not at all.
-    for file, content in ((name, code), (f"{module}.native.json", json.dumps(manifest).encode())):
-        with tempfile.NamedTemporaryFile(dir=directory, delete=False) as temporary:
-            temporary.write(content)
-        os.replace(temporary.name, Path(directory) / file)
+    return {file: _digest(Path(file).read_bytes()) for file in sorted(filter(None, files))}
 
 
 def _self_contained(entry: EntryPoint, machine: Any) -> Any:

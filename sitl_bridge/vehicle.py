@@ -14,22 +14,21 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 import annotated_types
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+import numpy as np
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
-Vector = tuple[float, float, float]
-Model = TypeVar("Model", bound="Section")
+from sitl_bridge.schema import Section, Vector, quantity
+from sitl_bridge.sensors import Sensors
+
+Model = TypeVar("Model", bound=Section)
 
 
-def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> Any:
-    """Declare a field with its unit and allowed range; both appear in messages about a faulty file."""
-    return Field(default, description=description, json_schema_extra={"unit": unit}, **bounds)
+class Drag(Section):
+    """Drag of a body in air, F = -(k_1 + k_2 |v|) v with v its velocity through the air."""
 
-
-class Section(BaseModel):
-    """A table of the description: unknown keys and values that are not finite are faults."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    linear: float = quantity("N s/m", "k_1, on each axis alike", 0.0, ge=0, le=1e3)
+    quadratic: float = quantity("N s²/m²", "k_2, half of air density times drag area", 0.0, ge=0, le=1e3)
 
 
 class Airframe(Section):
@@ -42,6 +41,10 @@ class Airframe(Section):
         ],
         Field(description="principal moments of inertia, body axes", json_schema_extra={"unit": "kg m²"}),
     ]
+    drag: Drag = Drag()
+    legs: tuple[Vector, ...] = quantity(
+        "m", "points that touch the ground, body FLU, from the centre of mass", (), max_length=8
+    )
 
 
 class Rotor(Section):
@@ -50,6 +53,7 @@ class Rotor(Section):
     thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
     torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
     max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
+    time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
 
 
 class Cable(Section):
@@ -61,15 +65,71 @@ class Cable(Section):
         "two-way also pushes below its rest length (the paper's); tension-only never does",
         "tension-only",
     )
+    breaking_tension: float | None = quantity("N", "more than this, and the cable breaks", None, gt=0)
 
 
 class Load(Section):
     mass: float = quantity("kg", "m_p", gt=0, le=1e4)
+    radius: float = quantity("m", "height of its centre above the ground that it lies on", 0.0, ge=0, le=10)
+    drag: Drag = Drag()
+
+
+class Ground(Section):
+    """Level ground: compliant, with friction. Its stiffness follows from how far it yields to a resting
+    body."""
+
+    height: float = quantity("m", "world z of the surface", 0.0)
+    sink: float = quantity("m", "how far a body at rest sinks in", 0.003, gt=0, le=0.1)
+    damping_ratio: float = quantity("-", "of a resting body's bounce", 0.7, ge=0, le=2)
+    friction: float = quantity("-", "coefficient of friction under the legs", 0.6, ge=0, le=5)
+    load_friction: float = quantity("-", "coefficient of friction under the load", 0.5, ge=0, le=5)
+
+
+class Turbulence(Section):
+    """Dryden turbulence at low altitude, MIL-F-8785C 3.7.3.4."""
+
+    wind_at_6_m: float = quantity("m/s", "W_20: light 7.7, moderate 15.4, severe 23.1", gt=0, le=60)
+    height: float = quantity("m", "height above ground that sets scale and intensity", 10.0, ge=3, le=300)
+    airspeed: float = quantity("m/s", "V: how fast the frozen field drifts past", 5.0, gt=0, le=100)
+
+
+class Gust(Section):
+    """One 1-cosine gust: from nothing to the peak and back."""
+
+    start: float = quantity("s", "from the start of the scenario", ge=0)
+    duration: float = quantity("s", "from nothing to nothing", gt=0, le=1e3)
+    peak: Vector = quantity("m/s", "air velocity at its height, world ENU, on top of the wind")
+    acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that it meets", "both")
+
+
+class Air(Section):
+    wind: Vector = quantity("m/s", "steady air velocity, world ENU", (0.0, 0.0, 0.0))
+    turbulence: Turbulence | None = None
+    gusts: tuple[Gust, ...] = ()
+
+
+class Battery(Section):
+    """A pack of lithium cells: voltage falls with the charge drawn and with the current."""
+
+    cells: int = quantity("-", "in series", ge=1, le=100)
+    capacity: float = quantity("A h", "charge of the full pack", gt=0, le=1e4)
+    resistance: float = quantity("ohm", "of the whole pack", ge=0, le=10)
+    full_cell_voltage: float = quantity("V", "open circuit, full", 4.2, gt=0, le=10)
+    empty_cell_voltage: float = quantity("V", "open circuit, empty", 3.5, gt=0, le=10)
+    charge: float = quantity("-", "share of the capacity that is left at the start", 1.0, gt=0, le=1)
+    drive_efficiency: float = quantity("-", "rotor shaft power over electric power", 0.75, gt=0, le=1)
+    avionics_power: float = quantity("W", "drawn by everything but the rotors", 5.0, ge=0, le=1e4)
 
 
 class Initial(Section):
-    """Start state. Without a vehicle position, the vehicle hangs above the load at the equilibrium length."""
+    """Start state: hovering above the load at the equilibrium length, or both at rest on the ground.
 
+    On the ground, positions give east and north only, and the vehicle stands at the origin unless told where.
+    """
+
+    start: Literal["hover", "ground"] = quantity(
+        "-", "in the air, or on the legs with a slack cable", "hover"
+    )
     load_position: Vector = quantity("m", "world ENU", (0.0, 0.0, 0.0))
     vehicle_position: Vector | None = quantity("m", "world ENU", None)
     load_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
@@ -104,12 +164,16 @@ class Vehicle(Section):
     gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
     airframe: Airframe
     rotors: tuple[Rotor, ...] = quantity(
-        "rotors", "in the order of the actuator controls", min_length=4, max_length=16
+        "-", "in the order of the actuator controls", min_length=4, max_length=16
     )
     cable: Cable
     load: Load
     initial: Initial = Initial()
     disturbance: Disturbance = Disturbance()
+    ground: Ground | None = None
+    air: Air = Air()
+    battery: Battery | None = None
+    sensors: Sensors = Sensors()
     loop: Loop = Loop()
     home: Home = Home()
 
@@ -124,6 +188,19 @@ class Vehicle(Section):
             raise ValueError("initial.vehicle_position equals initial.load_position: no cable direction")
         return self
 
+    @model_validator(mode="after")
+    def _can_stand(self) -> Vehicle:
+        if self.ground is not None and len(self.airframe.legs) < 3:
+            raise ValueError("airframe.legs: on ground a vehicle needs three or more; expected points in m")
+        if self.ground is None and self.initial.start == "ground":
+            raise ValueError("initial.start = 'ground': there is no [ground] table")
+        if self.initial.start == "ground" and self.initial_length > self.cable.rest_length:
+            raise ValueError(
+                f"initial: the load lies {self.initial_length:.4g} m from the vehicle, "
+                f"further than cable.rest_length = {self.cable.rest_length:.4g} m"
+            )
+        return self
+
     @property
     def hover_thrust(self) -> float:
         """Total thrust that carries vehicle and load, N (eq. 19)."""
@@ -136,11 +213,27 @@ class Vehicle(Section):
 
     @property
     def initial_vehicle_position(self) -> Vector:
-        """Where the vehicle starts, m, world ENU: as given, or in equilibrium above the load."""
+        """Where the vehicle starts, m, world ENU: as given, in equilibrium above the load, or on its legs."""
+        if self.initial.start == "ground" and self.ground is not None:
+            x, y, _ = self.initial.vehicle_position or (0.0, 0.0, 0.0)
+            return (x, y, self.ground.height - min(leg[2] for leg in self.airframe.legs) - self.ground.sink)
         if self.initial.vehicle_position is not None:
             return self.initial.vehicle_position
         x, y, z = self.initial.load_position
         return (x, y, z + self.hover_length)
+
+    @property
+    def initial_load_position(self) -> Vector:
+        """Where the load starts, m, world ENU: as given, or lying on the ground there."""
+        x, y, z = self.initial.load_position
+        if self.initial.start == "ground" and self.ground is not None:
+            z = self.ground.height + self.load.radius - self.ground.sink
+        return (x, y, z)
+
+    @property
+    def initial_length(self) -> float:
+        """Distance from vehicle to load at the start, m."""
+        return math.dist(self.initial_vehicle_position, self.initial_load_position)
 
 
 class DescriptionError(ValueError):
@@ -177,10 +270,10 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
         raise DescriptionError(
             name_or_file, [f"no such {kind}; expected one of {known}, or the path of a .toml file"]
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
     except tomllib.TOMLDecodeError as error:
         raise DescriptionError(name_or_file, [f"not valid TOML: {error}"]) from None
+    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or no possible path
+        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
 
 
 def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
@@ -191,7 +284,19 @@ def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
     source, content = read_toml(name_or_file, resources.files(__package__) / "vehicles", "vehicle")
     for override in overrides:
         apply_override(content, override)
+    if isinstance(sensors := content.get("sensors"), dict) and "preset" in sensors:
+        _, preset = read_toml(str(sensors["preset"]), resources.files(__package__) / "presets", "preset")
+        content["sensors"] = _merged(preset, sensors)
     return validated(Vehicle, content, source)
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Nested tables with some values replaced."""
+    out = dict(base)
+    for key, value in changes.items():
+        old = out.get(key)
+        out[key] = _merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return out
 
 
 def apply_override(content: dict[str, Any], override: str) -> None:
@@ -201,14 +306,16 @@ def apply_override(content: dict[str, Any], override: str) -> None:
     if not equals or not all(path):
         raise DescriptionError("--set", [f"{override!r}: expected KEY=VALUE, as in cable.rest_length=10"])
     try:
-        value: Any = tomllib.loads(f"value = {text.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
+        parsed = tomllib.loads(f"value = {text.strip()}")
+    except ValueError:
+        parsed = {}
+    # A bare word is no TOML; more than one value (on lines of their own) is no value either.
+    value: Any = parsed["value"] if parsed.keys() == {"value"} else text.strip()
     target: Any = content
     for step, following in zip(path, [*path[1:], None], strict=True):
         place: Any = step
         if isinstance(target, list):
-            if not step.isdigit() or int(step) >= len(target):
+            if not step.isdecimal() or int(step) >= len(target):
                 raise DescriptionError("--set", [f"{key}: {step!r} is no index of a list of {len(target)}"])
             place = int(step)
         elif not isinstance(target, dict):
@@ -222,7 +329,7 @@ def apply_override(content: dict[str, Any], override: str) -> None:
 def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
     """Validate a parsed file against its model; raises DescriptionError with a line for each fault."""
     try:
-        return model.model_validate(content)
+        return model.model_validate(_tuples(content))
     except ValidationError as error:
         faults = error.errors()
         # A list that seems short only because one of its entries is at fault is no fault of its own.
@@ -231,20 +338,43 @@ def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Mo
         raise DescriptionError(source, [_fault_line(model, fault) for fault in own]) from None
 
 
+def _tuples(value: Any) -> Any:
+    """TOML's lists as the tuples that the models are made of."""
+    if isinstance(value, Mapping):
+        return {key: _tuples(entry) for key, entry in value.items()}
+    return tuple(_tuples(entry) for entry in value) if isinstance(value, list) else value
+
+
+# Where pydantic's words are those of Python and not of TOML.
+_PROBLEMS = {
+    "tuple_type": "not a list",
+    "model_type": "not a table",
+    "too_short": "too few",
+    "too_long": "too many",
+}
+
+
+def _shown(value: Any) -> str:
+    """A faulty value as it goes into a message, cut to a readable length."""
+    text = repr(list(value) if isinstance(value, tuple) else value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
 def _fault_line(model: type[BaseModel], fault: Any) -> str:
     """One line for one fault: key, value, unit, allowed range."""
     where = ".".join(str(part) for part in fault["loc"])
     field = _field_at(model, fault["loc"])
     unit = _unit(field)
-    problem = fault["msg"].removeprefix("Value error, ")
+    problem = _PROBLEMS.get(fault["type"], fault["msg"].removeprefix("Value error, "))
     if fault["type"] == "missing":
         return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
     if fault["type"] == "extra_forbidden":
-        return f"{where} = {fault['input']!r}: no such key"
+        return f"{where} = {_shown(fault['input'])}: no such key"
     if fault["type"] == "value_error":
         return f"{where}: {problem}" if where else problem
-    allowed = _expectation(field)
-    value = f"{where} = {fault['input']!r}{f' {unit}' if unit else ''}"
+    of_list = isinstance(fault["loc"][-1], int)
+    allowed = _expectation(field, entry=of_list)
+    value = f"{where} = {_shown(fault['input'])}{f' {unit}' if unit else ''}"
     return f"{value}: {problem[0].lower()}{problem[1:]}{f'; allowed: {allowed}' if allowed else ''}"
 
 
@@ -268,10 +398,12 @@ def _unit(field: FieldInfo | None) -> str:
     return "" if unit in ("-", "") else str(unit)
 
 
-def _expectation(field: FieldInfo | None) -> str:
-    """The allowed range of a field in words, from its own declaration."""
+def _expectation(field: FieldInfo | None, entry: bool = False) -> str:
+    """The allowed range of a field, or of one entry of it, in words, from its own declaration."""
     if field is None:
         return ""
+    if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+        return "a table"
     options = getattr(field.annotation, "__args__", ())
     if options and all(isinstance(option, str) for option in options):
         return " or ".join(options)
@@ -280,6 +412,11 @@ def _expectation(field: FieldInfo | None) -> str:
         metadata += [
             m for info in getattr(argument, "__metadata__", ()) for m in getattr(info, "metadata", [])
         ]
+    lengths = [
+        getattr(m, name) for m in metadata for name in ("min_length", "max_length") if hasattr(m, name)
+    ]
+    if len(lengths) == 2:
+        return "a table" if entry else "{} to {} tables".format(*lengths)
     words: dict[str, None] = {}
     for mark in metadata:
         for kind, name, sign in (
@@ -290,8 +427,10 @@ def _expectation(field: FieldInfo | None) -> str:
         ):
             if isinstance(mark, kind):
                 words[f"{sign} {getattr(mark, name):g}"] = None
-    if not words and field.annotation in (float, Vector):
-        return "a finite number" if field.annotation is float else "three finite numbers"
+    if not words and Vector in (field.annotation, *options):
+        return "a finite number" if entry else "three finite numbers"
+    if field.annotation is str:
+        return "text"
     return " and ".join(words)
 
 
@@ -299,3 +438,20 @@ def hover_rotor_speed(vehicle: Vehicle) -> float:
     """Rotor speed of hover for a vehicle with equal rotors, rad/s (eq. 24, corrected)."""
     total = sum(rotor.thrust_coefficient for rotor in vehicle.rotors)
     return math.sqrt(vehicle.hover_thrust / total)
+
+
+def hover_rotor_speeds(vehicle: Vehicle) -> tuple[float, ...]:
+    """Rotor speeds that carry vehicle and load without any moment, for any layout, rad/s."""
+    effect = np.array(
+        [
+            (
+                rotor.thrust_coefficient,
+                rotor.position[1] * rotor.thrust_coefficient,
+                -rotor.position[0] * rotor.thrust_coefficient,
+                (-1.0 if rotor.direction == "ccw" else 1.0) * rotor.torque_coefficient,
+            )
+            for rotor in vehicle.rotors
+        ]
+    ).T
+    squared, *_ = np.linalg.lstsq(effect, np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]), rcond=None)
+    return tuple(np.sqrt(np.maximum(squared, 0.0)).tolist())

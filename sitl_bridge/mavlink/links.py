@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple, Protocol
 
 LARGEST_DATAGRAM = 65536
+RECEIVE_BUFFER = 1 << 20
 KINDS = ("udpout", "udpin", "tcpin", "tcpout")
 Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]
 
@@ -62,17 +63,21 @@ class UdpLink:
     reliable = False
 
     def __init__(self, address: Address) -> None:
-        """Raises OSError when the port is taken or the host unknown."""
+        """Raises OSError, naming the address, when the port is taken or the host unknown."""
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         self._fixed = address.kind == "udpout"
         self._peer: tuple[str, int] | None = None
-        if self._fixed:
-            self._peer = (socket.gethostbyname(address.host), address.port)
-            self._socket.bind(("", 0) if not self._peer[0].startswith("127.") else ("127.0.0.1", 0))
-        else:
-            self._socket.bind((address.host, address.port))
         self._timeout = 0.0
+        try:
+            if self._fixed:
+                self._peer = (socket.gethostbyname(address.host), address.port)
+                self._socket.bind(("127.0.0.1" if self._peer[0].startswith("127.") else "", 0))
+            else:
+                self._socket.bind((address.host, address.port))
+        except OSError as error:
+            self._socket.close()
+            raise OSError(f"{address} cannot be opened: {error.strerror or error}") from None
 
     @property
     def port(self) -> int:

@@ -5,53 +5,94 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.dynamics import FORCE_ROWS
-from sitl_bridge.vehicle import Disturbance
+from sitl_bridge.plant.air import WIND_HOLD, Wind
+from sitl_bridge.plant.dynamics import TABLE_ROWS
+from sitl_bridge.plant.streams import stream
+from sitl_bridge.vehicle import Disturbance, Vehicle
 
 STREAM = "white force"
 
 
-def random_stream(seed: int, name: str) -> np.random.Generator:
-    """The generator of one source of randomness; another name is another, independent stream."""
-    return np.random.default_rng([seed, *name.encode()])
+class HeldTable:
+    """A table of draws, rows of (6,) for vehicle and load, world; row k acts `hold_steps` steps."""
+
+    def __init__(self, hold_time: float, step: float) -> None:
+        self.hold_steps = max(1, round(hold_time / step))
+        self.table: NDArray[np.float64] = np.zeros((TABLE_ROWS, 6))
+        self.now: NDArray[np.float64] = np.zeros(6)
+        """The row that acts now."""
+        self.next_step = 0
+        """Number of the next step, counted from row 0."""
+        self.constant = True
+        """Whether nothing ever changes, so that the table need not be drawn again."""
+
+    @property
+    def steps_left(self) -> int:
+        """How many steps the table still covers."""
+        return TABLE_ROWS * self.hold_steps - self.next_step
+
+    def begin(self) -> None:
+        """Start from a fresh table."""
+        self.next_step = 0
+        self._fill()
+
+    def advance(self, steps: int) -> None:
+        """So many steps were taken."""
+        self.next_step += steps
+        if self.steps_left == 0:
+            self.next_step = 0
+            if not self.constant:
+                self._fill()
+        elif not self.constant:
+            self.now[:] = self.table[self.next_step // self.hold_steps]
+
+    def draw(self) -> None:
+        """Fill the whole table."""
+        raise NotImplementedError
+
+    def _fill(self) -> None:
+        self.draw()
+        self.now[:] = self.table[0]
 
 
-class HeldForce:
-    """A table of force draws, rows of (6,): on vehicle and load, N, world; row k acts `hold_steps` steps."""
+class HeldForce(HeldTable):
+    """White force, N."""
 
     def __init__(self, disturbance: Disturbance, step: float, seed: int) -> None:
+        super().__init__(disturbance.hold_time, step)
         self._std = np.zeros(6)
         if disturbance.acts_on != "load":
             self._std[:3] = disturbance.force_std
         if disturbance.acts_on != "vehicle":
             self._std[3:] = disturbance.force_std
-        self.hold_steps = max(1, round(disturbance.hold_time / step))
-        self.table: NDArray[np.float64] = np.zeros((FORCE_ROWS, 6))
-        self.now: NDArray[np.float64] = np.zeros(6)
-        """The force that acts now."""
+        self.constant = not self._std.any()
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
         """Begin again with a fresh stream."""
-        self._generator = random_stream(seed, STREAM)
-        self._next_step = 0
-        self._draw()
+        self._generator = stream(seed, STREAM)
+        self.begin()
 
-    def position(self, steps: int) -> tuple[int, int]:
-        """(number of the next step in the table, how many of `steps` it still covers)."""
-        covered = FORCE_ROWS * self.hold_steps - self._next_step
-        return self._next_step, min(steps, covered)
+    def draw(self) -> None:
+        """Fresh draws."""
+        if not self.constant:
+            self.table[:] = self._generator.standard_normal((TABLE_ROWS, 6)) * self._std
 
-    def advance(self, steps: int) -> None:
-        """So many steps were taken."""
-        self._next_step += steps
-        if self._next_step == FORCE_ROWS * self.hold_steps:
-            self._next_step = 0
-            self._draw()
-        elif self._std.any():
-            self.now[:] = self.table[self._next_step // self.hold_steps]
 
-    def _draw(self) -> None:
-        if self._std.any():
-            self.table[:] = self._generator.standard_normal((FORCE_ROWS, 6)) * self._std
-            self.now[:] = self.table[0]
+class HeldWind(HeldTable):
+    """Air velocity at vehicle and load, m/s."""
+
+    def __init__(self, vehicle: Vehicle, step: float, seed: int) -> None:
+        super().__init__(WIND_HOLD, step)
+        self._vehicle = vehicle
+        self.reset(seed)
+
+    def reset(self, seed: int) -> None:
+        """Begin again with a fresh stream."""
+        self.wind = Wind(self._vehicle, seed)
+        self.constant = self.wind.constant
+        self.begin()
+
+    def draw(self) -> None:
+        """What blows next."""
+        self.wind.fill(self.table)

@@ -2,6 +2,10 @@
 
 Compiled; pure functions of their arguments, except that results are written into arrays that the caller
 gives, so that a step allocates nothing.
+
+One step of h seconds: rotor speeds at its start, middle and end from the exact solution of their lag; classic
+Runge-Kutta on the state with the cable held taut or slack; where the cable changes over within the step,
+the step is split there; then contacts slip that have to, and an overloaded cable breaks.
 """
 
 from __future__ import annotations
@@ -12,91 +16,141 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point, kernel
-from sitl_bridge.plant.cable import tension
-from sitl_bridge.plant.parameters import MOST_ROTORS, PARAMETERS
-from sitl_bridge.plant.state import STATE_SIZE, Array
+from sitl_bridge.plant.air import add_drag
+from sitl_bridge.plant.cable import cable_acts, slack_or_taut, spring_force, tension
+from sitl_bridge.plant.ground import ground_on_load, ground_on_vehicle, move_anchors
+from sitl_bridge.plant.parameters import PARAMETERS
+from sitl_bridge.plant.rotors import rotor_decay, rotor_wrench, spin_up
+from sitl_bridge.plant.state import (
+    ANGULAR_ACCELERATION,
+    CABLE_HOLDS,
+    INNER_SIZE,
+    LOAD_GROUND_FORCE,
+    MOST_ROTORS,
+    STATE_SIZE,
+    TENSION,
+    VEHICLE_GROUND_FORCE,
+    Array,
+)
+
+WORK_ROWS = 11
+"""Rows of the scratch array: 0 to 4 Runge-Kutta, 5 ground, 6 state at the start of the step, 7 decays, 8 to
+10 rotor speeds in the middle and at the end of a step, and at the start of a split one."""
+_GROUND, _START, _DECAY, _MIDDLE, _END, _SPLIT = 5, 6, 7, 8, 9, 10
+_FIRST_ANGULAR: int = ANGULAR_ACCELERATION.start
 
 
 @kernel
-def rotor_wrench(p: Any, rotor_speed: Array) -> tuple[float, float, float, float]:
-    """Total thrust (N) and moments about the body's x, y, z (N m) of all rotors (eqs. 6 and 13).
-
-    p: parameter record; rotor_speed: (n,) in rad/s.
-    """
-    thrust, roll, pitch, yaw = 0.0, 0.0, 0.0, 0.0
-    for i in range(p.rotor_count):
-        squared = rotor_speed[i] * rotor_speed[i]
-        lift = p.thrust_coefficient[i] * squared
-        thrust += lift
-        roll += p.rotor_y[i] * lift
-        pitch -= p.rotor_x[i] * lift
-        yaw += p.reaction_coefficient[i] * squared
-    return thrust, roll, pitch, yaw
-
-
-@kernel
-def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -> None:
+def rates(
+    p: Any,
+    x: Array,
+    inner: Array,
+    wrench: tuple[float, float, float, float],
+    acts: bool,
+    force: Array,
+    wind: Array,
+    ground: Array,
+    out: Array,
+) -> None:
     """Time derivative of the state.
 
-    p: parameter record; x: state (19,), see `state`; rotor_speed: (n,) in rad/s; force: (6,) external
-    force on vehicle and on load, N, world; out: (19,), written.
+    p: parameter record; x: state (19,), see `state`; inner: inner state (35,), of which anchors are read;
+    wrench: of the rotors; acts: whether the cable exerts its force; force: (6,) external force on vehicle
+    and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (6,) or more,
+    scratch; out: (19,), written.
     """
     vx, vy, vz = x[3], x[4], x[5]
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
     rate_p, rate_q, rate_r = x[10], x[11], x[12]
     wx, wy, wz = x[16], x[17], x[18]
-
-    # The cable: e points from the vehicle to the load.
-    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
-    length = (ex * ex + ey * ey + ez * ez) ** 0.5
-    ex, ey, ez = ex / length, ey / length, ez / length
-    rate = (wx - vx) * ex + (wy - vy) * ey + (wz - vz) * ez
-    pull = tension(p, length, rate)
-
-    thrust, roll, pitch, yaw = rotor_wrench(p, rotor_speed)
+    thrust, roll, pitch, yaw = wrench
 
     out[0], out[1], out[2] = vx, vy, vz
+    out[13], out[14], out[15] = wx, wy, wz
     # Translation (eq. 3): the body's z axis in the world carries the thrust (eq. 7).
     lift = thrust / p.vehicle_mass
-    tug = pull / p.vehicle_mass
-    out[3] = 2.0 * (qx * qz + qw * qy) * lift + tug * ex + force[0] / p.vehicle_mass
-    out[4] = 2.0 * (qy * qz - qw * qx) * lift + tug * ey + force[1] / p.vehicle_mass
-    out[5] = (1.0 - 2.0 * (qx * qx + qy * qy)) * lift + tug * ez + force[2] / p.vehicle_mass - p.gravity
+    if acts:
+        # The cable: e points from the vehicle to the load.
+        ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
+        length = (ex * ex + ey * ey + ez * ez) ** 0.5
+        ex, ey, ez = ex / length, ey / length, ez / length
+        rate = (wx - vx) * ex + (wy - vy) * ey + (wz - vz) * ez
+        pull = spring_force(p, length, rate)
+        tug = pull / p.vehicle_mass
+        out[3] = 2.0 * (qx * qz + qw * qy) * lift + tug * ex + force[0] / p.vehicle_mass
+        out[4] = 2.0 * (qy * qz - qw * qx) * lift + tug * ey + force[1] / p.vehicle_mass
+        out[5] = (1.0 - 2.0 * (qx * qx + qy * qy)) * lift + tug * ez + force[2] / p.vehicle_mass - p.gravity
+        load_tug = pull / p.load_mass
+        out[16] = -load_tug * ex + force[3] / p.load_mass
+        out[17] = -load_tug * ey + force[4] / p.load_mass
+        out[18] = -load_tug * ez + force[5] / p.load_mass - p.gravity
+    else:
+        out[3] = 2.0 * (qx * qz + qw * qy) * lift + force[0] / p.vehicle_mass
+        out[4] = 2.0 * (qy * qz - qw * qx) * lift + force[1] / p.vehicle_mass
+        out[5] = (1.0 - 2.0 * (qx * qx + qy * qy)) * lift + force[2] / p.vehicle_mass - p.gravity
+        out[16], out[17] = force[3] / p.load_mass, force[4] / p.load_mass
+        out[18] = force[5] / p.load_mass - p.gravity
     # Attitude: q' = q (0, p, q, r) / 2.
     out[6] = -0.5 * (qx * rate_p + qy * rate_q + qz * rate_r)
     out[7] = 0.5 * (qw * rate_p + qy * rate_r - qz * rate_q)
     out[8] = 0.5 * (qw * rate_q + qz * rate_p - qx * rate_r)
     out[9] = 0.5 * (qw * rate_r + qx * rate_q - qy * rate_p)
+
+    if p.has_drag:
+        add_drag(p, x, wind, out)
+    if p.has_ground:
+        if x[2].real - p.ground_height < p.leg_reach:
+            ground_on_vehicle(p, x, inner, ground)
+            out[3] += ground[0] / p.vehicle_mass
+            out[4] += ground[1] / p.vehicle_mass
+            out[5] += ground[2] / p.vehicle_mass
+            roll += ground[3]
+            pitch += ground[4]
+            yaw += ground[5]
+        if x[15].real - p.ground_height < p.load_radius:
+            fx, fy, fz = ground_on_load(p, x, inner)
+            out[16] += fx / p.load_mass
+            out[17] += fy / p.load_mass
+            out[18] += fz / p.load_mass
     # Rotation (eq. 10).
     inertia_x, inertia_y, inertia_z = p.inertia[0], p.inertia[1], p.inertia[2]
     out[10] = (roll - (inertia_z - inertia_y) * rate_q * rate_r) / inertia_x
     out[11] = (pitch - (inertia_x - inertia_z) * rate_p * rate_r) / inertia_y
     out[12] = (yaw - (inertia_y - inertia_x) * rate_p * rate_q) / inertia_z
-    out[13], out[14], out[15] = wx, wy, wz
-    load_tug = pull / p.load_mass
-    out[16] = -load_tug * ex + force[3] / p.load_mass
-    out[17] = -load_tug * ey + force[4] / p.load_mass
-    out[18] = -load_tug * ez + force[5] / p.load_mass - p.gravity
 
 
 @kernel
-def runge_kutta_4(p: Any, x: Array, rotor_speed: Array, force: Array, step: float, work: Array) -> None:
-    """Advance the state by one fixed step of the classic fourth-order Runge-Kutta method, in place.
+def runge_kutta_4(
+    p: Any,
+    x: Array,
+    inner: Array,
+    acts: bool,
+    force: Array,
+    wind: Array,
+    step: float,
+    work: Array,
+) -> None:
+    """Advance the state by one step of the classic fourth-order Runge-Kutta method, in place.
 
-    step: s; work: (5, 19) scratch. The quaternion is brought back to unit length afterwards.
+    Rotor speeds at the start are those of `inner`, those in the middle and at the end are in `work`.
+    step: s; work: scratch. The quaternion is brought back to unit length afterwards.
     """
-    k1, k2, k3, k4, probe = work[0], work[1], work[2], work[3], work[4]
+    k1, k2, k3, k4, probe, ground = work[0], work[1], work[2], work[3], work[4], work[_GROUND]
     half, sixth = 0.5 * step, step / 6.0
-    derivative(p, x, rotor_speed, force, k1)
+    end = rotor_wrench(p, work[_END])
+    start = middle = end
+    if p.has_lag:
+        start, middle = rotor_wrench(p, inner), rotor_wrench(p, work[_MIDDLE])
+    rates(p, x, inner, start, acts, force, wind, ground, k1)
     for i in range(STATE_SIZE):
         probe[i] = x[i] + half * k1[i]
-    derivative(p, probe, rotor_speed, force, k2)
+    rates(p, probe, inner, middle, acts, force, wind, ground, k2)
     for i in range(STATE_SIZE):
         probe[i] = x[i] + half * k2[i]
-    derivative(p, probe, rotor_speed, force, k3)
+    rates(p, probe, inner, middle, acts, force, wind, ground, k3)
     for i in range(STATE_SIZE):
         probe[i] = x[i] + step * k3[i]
-    derivative(p, probe, rotor_speed, force, k4)
+    rates(p, probe, inner, end, acts, force, wind, ground, k4)
     for i in range(STATE_SIZE):
         x[i] += sixth * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     norm = math.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
@@ -104,16 +158,172 @@ def runge_kutta_4(p: Any, x: Array, rotor_speed: Array, force: Array, step: floa
         x[i] /= norm
 
 
-FORCE_ROWS = 1024
-"""Rows of the table of held forces that `advance` reads."""
+@kernel
+def partial_step(
+    p: Any,
+    x: Array,
+    inner: Array,
+    command: Array,
+    acts: bool,
+    force: Array,
+    wind: Array,
+    step: float,
+    work: Array,
+) -> None:
+    """Runge-Kutta step of any length from the state saved in `work`, with the rotors' lag worked out for it.
+
+    Leaves the rotor speeds at its end in `work`.
+    """
+    for i in range(STATE_SIZE):
+        x[i] = work[_START, i]
+    rotor_decay(p, 0.5 * step, work[_SPLIT])
+    spin_up(p, inner, command, work[_SPLIT], work[_MIDDLE])
+    spin_up(p, work[_MIDDLE], command, work[_SPLIT], work[_END])
+    runge_kutta_4(p, x, inner, acts, force, wind, step, work)
+
+
+MOST_CHANGES = 4
+"""Changes of the cable between slack and taut that one step looks for; a mode of the cable takes ten
+steps."""
+
+
+@kernel
+def split_step(
+    p: Any,
+    x: Array,
+    inner: Array,
+    command: Array,
+    acts: bool,
+    force: Array,
+    wind: Array,
+    step: float,
+    work: Array,
+) -> None:
+    """Repeat, from the state saved in `work`, a step in which the cable goes slack or taut, split where it
+    does.
+
+    The instant is found by false position (Illinois) to 1e-12 of a second, from the side past the change.
+    """
+    left = step
+    sign = 1.0 if acts else -1.0
+    for _ in range(MOST_CHANGES):
+        before, after = 0.0, left
+        for i in range(STATE_SIZE):
+            x[i] = work[_START, i]
+        value_before = sign * slack_or_taut(p, x)
+        partial_step(p, x, inner, command, acts, force, wind, left, work)
+        value_after = sign * slack_or_taut(p, x)
+        if value_after > 0.0:
+            break  # no change in what is left of the step: done
+        for _ in range(60):
+            if after - before <= 1e-12:
+                break
+            middle = 0.5 * (before + after)
+            if value_before > value_after:
+                guess = before + (after - before) * value_before / (value_before - value_after)
+                if before < guess < after:
+                    middle = guess
+            partial_step(p, x, inner, command, acts, force, wind, middle, work)
+            value = sign * slack_or_taut(p, x)
+            if value > 0.0:
+                before, value_before = middle, value
+                value_after *= 0.5
+            else:
+                after, value_after = middle, value
+                value_before *= 0.5
+        partial_step(p, x, inner, command, acts, force, wind, after, work)
+        for i in range(p.rotor_count):
+            inner[i] = work[_END, i]
+        for i in range(STATE_SIZE):
+            work[_START, i] = x[i]
+        left -= after
+        sign, acts = -sign, not acts
+        if left <= 0.0:
+            break
+    else:
+        partial_step(p, x, inner, command, acts, force, wind, left, work)
+    for i in range(p.rotor_count):
+        inner[i] = work[_END, i]
+
+
+@kernel
+def whole_step(
+    p: Any, x: Array, inner: Array, command: Array, force: Array, wind: Array, step: float, work: Array
+) -> None:
+    """Advance state and inner state by one step, in place; the decays of half a step are in `work`."""
+    acts = cable_acts(p, x, inner)
+    watched = inner[CABLE_HOLDS] > 0.0 and not p.two_way
+    if watched:
+        for i in range(STATE_SIZE):
+            work[_START, i] = x[i]
+    spin_up(p, inner, command, work[_DECAY], work[_MIDDLE])
+    spin_up(p, work[_MIDDLE], command, work[_DECAY], work[_END])
+    runge_kutta_4(p, x, inner, acts, force, wind, step, work)
+    if watched and (slack_or_taut(p, x) > 0.0) != acts:
+        split_step(p, x, inner, command, acts, force, wind, step, work)
+    else:
+        for i in range(p.rotor_count):
+            inner[i] = work[_END, i]
+    if p.has_ground:
+        move_anchors(p, x, inner)
+    if p.breaking_tension < math.inf and inner[CABLE_HOLDS] > 0.0 and pull_of(p, x) > p.breaking_tension:
+        inner[CABLE_HOLDS] = 0.0
+
+
+@kernel
+def pull_of(p: Any, x: Array) -> float:
+    """Tension (N) of a cable that holds, in this state."""
+    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
+    length = (ex * ex + ey * ey + ez * ez) ** 0.5
+    if length <= 0.0:
+        return 0.0
+    rate = ((x[16] - x[3]) * ex + (x[17] - x[4]) * ey + (x[18] - x[5]) * ez) / length
+    return float(tension(p, length, rate))
+
+
+@kernel
+def feel(p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array, reactions: Array) -> None:
+    """What acts on the bodies in this state, see `state` for the elements of `reactions` (9,), written."""
+    rate = work[0]
+    acts = cable_acts(p, x, inner)
+    rates(p, x, inner, rotor_wrench(p, inner), acts, force, wind, work[_GROUND], rate)
+    qw, qx, qy, qz = x[6], x[7], x[8], x[9]
+    ax, ay, az = rate[3], rate[4], rate[5] + p.gravity
+    reactions[0] = (
+        (1 - 2 * (qy * qy + qz * qz)) * ax + 2 * (qx * qy + qw * qz) * ay + 2 * (qx * qz - qw * qy) * az
+    )
+    reactions[1] = (
+        2 * (qx * qy - qw * qz) * ax + (1 - 2 * (qx * qx + qz * qz)) * ay + 2 * (qy * qz + qw * qx) * az
+    )
+    reactions[2] = (
+        2 * (qx * qz + qw * qy) * ax + 2 * (qy * qz - qw * qx) * ay + (1 - 2 * (qx * qx + qy * qy)) * az
+    )
+    for i in range(3):
+        reactions[_FIRST_ANGULAR + i] = rate[10 + i]
+    reactions[TENSION] = pull_of(p, x) if acts else 0.0
+    reactions[VEHICLE_GROUND_FORCE] = 0.0
+    reactions[LOAD_GROUND_FORCE] = 0.0
+    if p.has_ground:
+        if x[2] - p.ground_height < p.leg_reach:
+            ground_on_vehicle(p, x, inner, work[_GROUND])
+            reactions[VEHICLE_GROUND_FORCE] = work[_GROUND, 2]
+        _, _, reactions[LOAD_GROUND_FORCE] = ground_on_load(p, x, inner)
+
+
+TABLE_ROWS = 1024
+"""Rows of the tables of held forces and winds that `advance` reads."""
 
 
 @entry_point(
     Buffer(PARAMETERS, (1,)),
     Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.float64, (INNER_SIZE,)),
     Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(np.float64, (FORCE_ROWS, 6)),
-    Buffer(np.float64, (5, STATE_SIZE)),
+    Buffer(np.float64, (TABLE_ROWS, 6)),
+    Buffer(np.float64, (TABLE_ROWS, 6)),
+    Buffer(np.float64, (WORK_ROWS, STATE_SIZE)),
+    int,
+    int,
     int,
     int,
     int,
@@ -122,20 +332,41 @@ FORCE_ROWS = 1024
 def advance(
     record: Any,
     x: Array,
-    rotor_speed: Array,
+    inner: Array,
+    command: Array,
     forces: Array,
+    winds: Array,
     work: Array,
-    first_step: int,
-    hold_steps: int,
+    first_force: int,
+    first_wind: int,
+    force_hold: int,
+    wind_hold: int,
     steps: int,
     step: float,
 ) -> int:
-    """Advance the state x by `steps` steps of `step` seconds with the rotors held, in place.
+    """Advance state and inner state by `steps` steps of `step` seconds with the commands held, in place.
 
-    forces: N, world, on vehicle and load; row k acts from step k·hold_steps on; work: scratch.
-    first_step: number of the first step, counted from row 0 of `forces`. Returns the next step's number.
+    command: rotor speeds, rad/s; forces: N, world, on vehicle and load, row k acts from step k·force_hold on;
+    winds: m/s, world, at vehicle and load, row k from step k·wind_hold on; work: scratch; first_force,
+    first_wind: number of the first step, counted from row 0 of each table.
     """
     p = record[0]
-    for index in range(first_step, first_step + steps):
-        runge_kutta_4(p, x, rotor_speed, forces[index // hold_steps], step, work)
-    return first_step + steps
+    rotor_decay(p, 0.5 * step, work[_DECAY])
+    for index in range(steps):
+        force = forces[(first_force + index) // force_hold]
+        wind = winds[(first_wind + index) // wind_hold]
+        whole_step(p, x, inner, command, force, wind, step, work)
+    return steps
+
+
+@kernel
+def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -> None:
+    """Time derivative of the state in still air off the ground, the rotors at these speeds.
+
+    p: parameter record; x: state (19,); rotor_speed: (n,) in rad/s; force: (6,), N, world; out: (19,),
+    written. Real parts decide whether the cable is taut, so that it can be differentiated with complex
+    numbers.
+    """
+    acts = p.two_way or slack_or_taut(p, x.real) > 0.0
+    anchored = np.zeros(INNER_SIZE)
+    rates(p, x, anchored, rotor_wrench(p, rotor_speed), acts, force, np.zeros(6), np.zeros(6), out)

@@ -17,6 +17,7 @@ from sitl_bridge.frames import (
     DEG_E7_PER_DEG,
     GAUSS_PER_TESLA,
     HECTOPASCALS_PER_PASCAL,
+    MICROSECONDS_PER_SECOND,
     MILLIMETRES_PER_METRE,
     LocalOrigin,
     attitude_to_ned_frd,
@@ -32,9 +33,9 @@ from sitl_bridge.mavlink.hil import (
     HIL_GPS,
     HIL_SENSOR,
     ODOMETRY,
-    SENSOR_ALL_FIELDS,
 )
-from sitl_bridge.plant.sensing import MEASUREMENT, GpsFix
+from sitl_bridge.plant.sensors.gps import GpsFix
+from sitl_bridge.plant.sensors.instruments import MEASUREMENT
 from sitl_bridge.plant.state import STATE_SIZE, Array
 
 DATAGRAM_SIZE = 2048  # what PX4 reads at once
@@ -70,7 +71,7 @@ def fill_sensor(out: Any, measured: Any) -> None:
     out.diff_pressure = measured.differential_pressure * HECTOPASCALS_PER_PASCAL
     out.pressure_alt = measured.pressure_altitude
     out.temperature = measured.temperature
-    out.fields_updated = SENSOR_ALL_FIELDS
+    out.fields_updated = measured.updated
 
 
 @kernel
@@ -175,7 +176,7 @@ class TickWriter:
         point = self._origin.geodetic(fix.position)
         north, east, down = enu_to_ned(fix.velocity)
         ground_speed = math.hypot(north, east)
-        record["time_usec"] = time_usec
+        record["time_usec"] = max(0, time_usec - round(fix.age * MICROSECONDS_PER_SECOND))
         record["lat"] = round(point.latitude * DEG_E7_PER_DEG)
         record["lon"] = round(point.longitude * DEG_E7_PER_DEG)
         record["alt"] = round(point.altitude * MILLIMETRES_PER_METRE)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.plant.ground import contact, leg_reach
+from sitl_bridge.plant.state import MOST_LEGS, MOST_ROTORS
 from sitl_bridge.vehicle import Vehicle
-
-MOST_ROTORS = 16  # as many as HIL_ACTUATOR_CONTROLS has controls
 
 PARAMETERS = np.dtype(
     [
@@ -18,13 +20,34 @@ PARAMETERS = np.dtype(
         ("stiffness", "f8"),
         ("damping", "f8"),
         ("rest_length", "f8"),
+        ("breaking_tension", "f8"),
         ("two_way", "b1"),
+        ("has_lag", "b1"),
+        ("has_drag", "b1"),
+        ("has_ground", "b1"),
         ("rotor_count", "i8"),
         ("rotor_x", "f8", MOST_ROTORS),
         ("rotor_y", "f8", MOST_ROTORS),
         ("thrust_coefficient", "f8", MOST_ROTORS),
         ("reaction_coefficient", "f8", MOST_ROTORS),
         ("max_speed", "f8", MOST_ROTORS),
+        ("time_constant", "f8", MOST_ROTORS),
+        ("vehicle_drag", "f8", 2),
+        ("load_drag", "f8", 2),
+        ("ground_height", "f8"),
+        ("contact_chi", "f8"),
+        ("leg_count", "i8"),
+        ("leg_reach", "f8"),
+        ("leg_x", "f8", MOST_LEGS),
+        ("leg_y", "f8", MOST_LEGS),
+        ("leg_z", "f8", MOST_LEGS),
+        ("leg_stiffness", "f8"),
+        ("leg_damping", "f8"),
+        ("leg_friction", "f8"),
+        ("load_radius", "f8"),
+        ("load_stiffness", "f8"),
+        ("load_damping", "f8"),
+        ("load_friction", "f8"),
     ]
 )
 
@@ -34,7 +57,8 @@ Parameters = NDArray[np.void]
 def parameters(vehicle: Vehicle) -> Parameters:
     """A record array of shape (1,) with everything that the equations of motion need, SI units.
 
-    `reaction_coefficient` is c_Q with the sign of the torque about body z (ccw rotors: negative, eq. 13).
+    `reaction_coefficient` is c_Q with the sign of the torque about body z (ccw rotors: negative, eq. 13);
+    `breaking_tension` is infinite for a cable that does not break.
     """
     record = np.zeros(1, dtype=PARAMETERS)
     p = record[0]
@@ -45,6 +69,7 @@ def parameters(vehicle: Vehicle) -> Parameters:
     p["stiffness"] = vehicle.cable.stiffness
     p["damping"] = vehicle.cable.damping
     p["rest_length"] = vehicle.cable.rest_length
+    p["breaking_tension"] = vehicle.cable.breaking_tension or math.inf
     p["two_way"] = vehicle.cable.model == "two-way"
     p["rotor_count"] = len(vehicle.rotors)
     for index, rotor in enumerate(vehicle.rotors):
@@ -53,4 +78,77 @@ def parameters(vehicle: Vehicle) -> Parameters:
         sign = -1.0 if rotor.direction == "ccw" else 1.0
         p["reaction_coefficient"][index] = sign * rotor.torque_coefficient
         p["max_speed"][index] = rotor.max_speed
+        p["time_constant"][index] = rotor.time_constant
+    p["has_lag"] = any(rotor.time_constant > 0.0 for rotor in vehicle.rotors)
+    for name, drag in (("vehicle_drag", vehicle.airframe.drag), ("load_drag", vehicle.load.drag)):
+        p[name] = drag.linear, drag.quadratic
+    p["has_drag"] = bool(p["vehicle_drag"].any() or p["load_drag"].any())
+    if vehicle.ground is not None:
+        _fill_ground(p, vehicle)
     return record
+
+
+def _fill_ground(p: np.void, vehicle: Vehicle) -> None:
+    ground, legs = vehicle.ground, vehicle.airframe.legs
+    assert ground is not None
+    p["has_ground"] = True
+    p["ground_height"] = ground.height
+    p["leg_count"] = len(legs)
+    for index, leg in enumerate(legs):
+        p["leg_x"][index], p["leg_y"][index], p["leg_z"][index] = leg
+    p["leg_reach"] = leg_reach(legs)
+    p["leg_stiffness"], p["contact_chi"], p["leg_damping"] = contact(
+        ground, vehicle.gravity, vehicle.airframe.mass, len(legs)
+    )
+    p["load_stiffness"], _, p["load_damping"] = contact(ground, vehicle.gravity, vehicle.load.mass, 1)
+    p["leg_friction"] = ground.friction
+    p["load_friction"] = ground.load_friction
+    p["load_radius"] = vehicle.load.radius
+
+
+def fastest_rate(vehicle: Vehicle) -> float:
+    """Largest modulus (1/s) of the eigenvalues of cable and ground contact, each on its own.
+
+    A mode of stiffness frequency w and damping rate 2 s has s -+ sqrt(s² - w²). The cable between two free
+    bodies has w² = k_a / m, s = c_a / 2m, with m the reduced mass. The ground has, for the vehicle's
+    turning about body axis i on its legs, w² = sum k (r² - r_i²) / I_i, for heave of either body w² = g /
+    sink, and damping in proportion to stiffness.
+    """
+    reduced = 1.0 / (1.0 / vehicle.airframe.mass + 1.0 / vehicle.load.mass)
+    modes = [(vehicle.cable.stiffness / reduced, vehicle.cable.damping / reduced)]
+    if vehicle.ground is not None:
+        stiffness, _, damping = contact(
+            vehicle.ground, vehicle.gravity, vehicle.airframe.mass, len(vehicle.airframe.legs)
+        )
+        heave = vehicle.gravity / vehicle.ground.sink
+        squares = [heave]
+        for axis, inertia in enumerate(vehicle.airframe.inertia):
+            arms = sum(
+                sum(part * part for index, part in enumerate(leg) if index != axis)
+                for leg in vehicle.airframe.legs
+            )
+            squares.append(stiffness * arms / inertia)
+        modes += [(square, square * damping / stiffness) for square in squares]
+    rates = []
+    for square, double in modes:
+        half = 0.5 * double
+        rates.append(
+            half + math.sqrt(max(half * half - square, 0.0)) if half * half > square else square**0.5
+        )
+    return max(rates)
+
+
+LONGEST_STEP = 1e-3
+"""s; the physics runs at 1 kHz or finer."""
+STEP_TIMES_RATE = 0.25
+"""Largest step times fastest rate: RK4 is then wrong by 1e-5 a radian, and has a tenfold reserve of
+stability."""
+
+
+def step_count(vehicle: Vehicle, duration: float) -> int:
+    """Number of equal steps that `duration` seconds (a tick, a hold) are integrated in.
+
+    Rule: no step longer than 1 ms, nor than a quarter of the inverse of the vehicle's `fastest_rate`.
+    """
+    longest = min(LONGEST_STEP, STEP_TIMES_RATE / fastest_rate(vehicle))
+    return max(1, math.ceil(duration / longest * (1.0 - 1e-9)))

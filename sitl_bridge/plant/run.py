@@ -55,6 +55,7 @@ class Progress:
     def begin(self) -> None:
         """The first armed answer is in."""
         self.began_at = time.monotonic()
+        self._speaker.say("the autopilot is armed: the scenario begins")
         self._speaker.event("begin", unix_time_s=time.time())
 
     def report(self, now: float, simulation: Simulation) -> None:

@@ -15,8 +15,8 @@ from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.ids import COMPONENT_TRUTH, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer, decode
 from sitl_bridge.mavlink.hil import ODOMETRY
+from sitl_bridge.plant.faults import Faults, from_command, timeline, with_gusts
 from sitl_bridge.plant.messages import TickWriter
-from sitl_bridge.plant.sensing import GPS_RATE_HZ, gps_fix
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
@@ -26,6 +26,9 @@ class Recorder(Protocol):
 
     def record(self, time_s: float, world: World) -> None:
         """Keep the world as it is at scenario time `time_s`, with the rotors as commanded from now on."""
+
+
+NO_FAULTS = Faults()
 
 
 class Simulation:
@@ -40,10 +43,13 @@ class Simulation:
         duration_s: float | None = None,
         recorder: Recorder | None = None,
         on_begin: Callable[[], None] = lambda: None,
+        faults: Faults = NO_FAULTS,
     ) -> None:
         self.rate_hz = rate_hz
         self.period = 1.0 / rate_hz
-        self.world = World(vehicle, rate_hz, seed)
+        self.world = World(with_gusts(vehicle, faults), rate_hz, seed)
+        self._faults = timeline(faults)
+        self._faults_done = 0
         self.tick = 0
         """Number of the current tick; its `time_usec` is that of tick_time(tick)."""
         self.ticks_flown = 0
@@ -62,7 +68,6 @@ class Simulation:
         self._writer = TickWriter(instance, self._origin, self.world.state, self.world.measurement)
         self._replies = Packer(vehicle_system(instance), COMPONENT_TRUTH)
         self._under_way: deque[Sequence[float]] = deque()
-        self._gps_ticks = max(1, round(rate_hz / GPS_RATE_HZ))
         self._datagram: bytes | None = None
 
     @property
@@ -83,9 +88,7 @@ class Simulation:
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for."""
         if self._datagram is None:
-            self.world.measure(not self.started, self._vehicle.home.altitude)
-            since = self.tick - self._first_flown
-            fix = gps_fix(self.world.state) if since % self._gps_ticks == 0 else None
+            fix = self.world.measure(self.tick - self._first_flown, not self.started)
             self._datagram = self._writer.datagram(self.time_usec, fix, self._truth and self._heard)
         return self._datagram
 
@@ -109,6 +112,8 @@ class Simulation:
         self._under_way.clear()
         for _ in range(self._vehicle.loop.delay_ticks):
             self._under_way.append(self.world.trim_controls)
+        self._faults_done = 0
+        self._apply_faults()
         self._on_begin()
 
     def next_tick(self) -> None:
@@ -134,26 +139,43 @@ class Simulation:
     def finish_tick(self) -> None:
         """The tick is over: the next one is the current one; the scenario's last is recorded too."""
         self.ticks_flown += 1
+        self._apply_faults()
         self.next_tick()
         if self.finished:
             self.record()
 
+    def _apply_faults(self) -> None:
+        """Let happen what is due at this tick of the scenario."""
+        while self._faults_done < len(self._faults):
+            due = self._faults[self._faults_done]
+            if due.time > self.scenario_time + 1e-9:
+                break
+            due.action.apply(self.world)
+            self._faults_done += 1
+
     def handle(self, frame: Frame) -> bytes | None:
         """Answer anything else that the autopilot says; the reply, if one is due.
 
-        SET_MESSAGE_INTERVAL for ODOMETRY asks for truth. Everything else that a real autopilot sends a
-        simulator on connecting (HEARTBEAT, an interval for HIL_STATE_QUATERNION) needs no reaction.
+        SET_MESSAGE_INTERVAL for ODOMETRY asks for truth, INJECT_FAILURE lets something fail. Everything else
+        that a real autopilot sends a simulator on connecting (HEARTBEAT, an interval for
+        HIL_STATE_QUATERNION) needs no reaction.
         """
         if frame.message_id != common.MAVLINK_MSG_ID_COMMAND_LONG:
             return None
         command = decode(frame)
-        asked = int(command.param1) if command.param1 == command.param1 else -1
-        if command.command != common.MAV_CMD_SET_MESSAGE_INTERVAL or asked != ODOMETRY.message_id:
+        result = common.MAV_RESULT_ACCEPTED
+        if command.command == common.MAV_CMD_INJECT_FAILURE:
+            actions = from_command(command.param1, command.param2, command.param3, len(self._vehicle.rotors))
+            for action in actions or ():
+                action.apply(self.world)
+            result = common.MAV_RESULT_UNSUPPORTED if actions is None else result
+        elif command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL and command.param1 == ODOMETRY.message_id:
+            self.ask_for_truth(command.param2 >= 0)
+        else:
             return None
-        self.ask_for_truth(command.param2 >= 0)
         acknowledgement: Any = common.MAVLink_command_ack_message(
             command=command.command,
-            result=common.MAV_RESULT_ACCEPTED,
+            result=result,
             progress=0,
             result_param2=0,
             target_system=frame.system,

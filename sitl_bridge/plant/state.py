@@ -1,6 +1,8 @@
-"""Names for the numbers of the plant's state: one flat vector, so that it integrates and logs as it is.
+"""Names for the numbers of the plant's state: flat vectors, so that they integrate and log as they are.
 
 World ENU, body FLU, SI units; the attitude quaternion (w, x, y, z) rotates body vectors into the world.
+The state proper is what the equations of motion integrate. The inner state is what else a body remembers:
+rotor speeds (their lag has an exact solution), where contacts stick to the ground, whether the cable holds.
 """
 
 from __future__ import annotations
@@ -8,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.frames import quaternion_from_euler
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.frames import quaternion_from_euler, rotate
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
 Array = NDArray[np.float64]
 
@@ -31,6 +33,31 @@ COLUMNS = (
 )
 """Log column of each element of the state, in order."""
 
+MOST_ROTORS = 16  # as many as HIL_ACTUATOR_CONTROLS has controls
+MOST_LEGS = 8
+LOAD_CONTACT = MOST_LEGS  # number of the load's contact, after those of the legs
+
+ROTOR_SPEED = slice(0, MOST_ROTORS)
+"""rad/s."""
+ANCHORS = slice(MOST_ROTORS, MOST_ROTORS + 2 * (MOST_LEGS + 1))
+"""East and north (m, world) of the point of the ground that each contact sticks to."""
+FIRST_ANCHOR = ANCHORS.start
+CABLE_HOLDS = ANCHORS.stop
+"""1 while the cable joins vehicle and load, 0 once it has broken or let go."""
+INNER_SIZE = CABLE_HOLDS + 1
+
+SPECIFIC_FORCE = slice(0, 3)
+"""m/s², body FLU: what an accelerometer at the centre of mass feels; cable, drag and ground included."""
+ANGULAR_ACCELERATION = slice(3, 6)
+"""rad/s², body FLU."""
+TENSION = 6
+"""N, of the cable."""
+VEHICLE_GROUND_FORCE = 7
+"""N, normal, of the ground on all legs."""
+LOAD_GROUND_FORCE = 8
+"""N, normal, of the ground on the load."""
+REACTIONS_SIZE = 9
+
 
 def initial_state(vehicle: Vehicle) -> Array:
     """The state (19,) that the description starts from."""
@@ -39,6 +66,23 @@ def initial_state(vehicle: Vehicle) -> Array:
     state[VEHICLE_VELOCITY] = vehicle.initial.vehicle_velocity
     state[ATTITUDE] = quaternion_from_euler(vehicle.initial.attitude)
     state[BODY_RATES] = vehicle.initial.body_rates
-    state[LOAD_POSITION] = vehicle.initial.load_position
+    state[LOAD_POSITION] = vehicle.initial_load_position
     state[LOAD_VELOCITY] = vehicle.initial.load_velocity
     return state
+
+
+def initial_inner_state(vehicle: Vehicle) -> Array:
+    """The inner state (35,) at the start: rotors at hover speed in the air and still on the ground."""
+    inner = np.zeros(INNER_SIZE)
+    if vehicle.initial.start == "hover":
+        inner[: len(vehicle.rotors)] = hover_rotor_speeds(vehicle)
+    x, y, _ = vehicle.initial_vehicle_position
+    attitude = quaternion_from_euler(vehicle.initial.attitude)
+    for index, leg in enumerate(vehicle.airframe.legs):
+        offset = rotate(attitude, leg)
+        place = FIRST_ANCHOR + 2 * index
+        inner[place : place + 2] = x + offset[0], y + offset[1]
+    place = FIRST_ANCHOR + 2 * LOAD_CONTACT
+    inner[place : place + 2] = vehicle.initial_load_position[:2]
+    inner[CABLE_HOLDS] = 1.0
+    return inner

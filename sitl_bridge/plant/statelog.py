@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.plant.cable import tension
-from sitl_bridge.plant.parameters import MOST_ROTORS, PARAMETERS
-from sitl_bridge.plant.state import COLUMNS, STATE_SIZE, Array
+from sitl_bridge.plant.dynamics import pull_of
+from sitl_bridge.plant.parameters import PARAMETERS
+from sitl_bridge.plant.state import CABLE_HOLDS, COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
 from sitl_bridge.plant.world import World
 
 FILE_NAME = "state.parquet"
@@ -34,6 +34,7 @@ def columns(rotor_count: int) -> list[str]:
 @entry_point(
     Buffer(PARAMETERS, (1,)),
     Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.float64, (INNER_SIZE,)),
     Buffer(np.float64, (MOST_ROTORS,)),
     Buffer(np.float64, (6,)),
     Buffer(np.float64, (CHUNK_ROWS, _WIDTH)),
@@ -41,20 +42,26 @@ def columns(rotor_count: int) -> list[str]:
     float,
 )
 def fill_row(
-    record: Any, x: Array, rotor_speed: Array, force: Array, rows: Array, index: int, time_s: float
+    record: Any,
+    x: Array,
+    inner: Array,
+    command: Array,
+    force: Array,
+    rows: Array,
+    index: int,
+    time_s: float,
 ) -> int:
-    """Write one row of the log."""
-    row = rows[index]
+    """Write one row of the log. Rotors without lag have the speed that is commanded now."""
+    p, row = record[0], rows[index]
     row[_TIME] = time_s
     for i in range(STATE_SIZE):
         row[_STATE + i] = x[i]
     ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
     length = (ex * ex + ey * ey + ez * ez) ** 0.5
-    rate = ((x[16] - x[3]) * ex + (x[17] - x[4]) * ey + (x[18] - x[5]) * ez) / length
     row[_LENGTH] = length
-    row[_TENSION] = tension(record[0], length, rate)
+    row[_TENSION] = pull_of(p, x) if inner[CABLE_HOLDS] > 0.0 else 0.0
     for i in range(MOST_ROTORS):
-        row[_ROTORS + i] = rotor_speed[i]
+        row[_ROTORS + i] = inner[i] if p.time_constant[i] > 0.0 else command[i]
     for i in range(6):
         row[_FORCE + i] = force[i]
     return index + 1

@@ -9,15 +9,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.disturbance import HeldForce
-from sitl_bridge.plant.dynamics import advance
-from sitl_bridge.plant.parameters import MOST_ROTORS, parameters
-from sitl_bridge.plant.sensing import MEASUREMENT, measure
-from sitl_bridge.plant.state import STATE_SIZE, Array, initial_state
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.battery import BatteryReading, drained, electric_power, reading
+from sitl_bridge.plant.disturbance import HeldForce, HeldWind
+from sitl_bridge.plant.dynamics import WORK_ROWS, advance
+from sitl_bridge.plant.parameters import parameters, step_count
+from sitl_bridge.plant.sensing import measure
+from sitl_bridge.plant.sensors.atmosphere import air_pressure
+from sitl_bridge.plant.sensors.gps import GpsFix, GpsReceiver
+from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
+from sitl_bridge.plant.sensors.magnetic import field_at
+from sitl_bridge.plant.sensors.tracker import LoadTracker
+from sitl_bridge.plant.state import (
+    CABLE_HOLDS,
+    MOST_ROTORS,
+    REACTIONS_SIZE,
+    STATE_SIZE,
+    Array,
+    initial_inner_state,
+    initial_state,
+)
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
-LARGEST_STEP = 1e-3
-"""Longest integration step, s."""
+STOPPED = (0.0,) * MOST_ROTORS
+"""Controls of rotors at rest."""
 
 
 class World:
@@ -25,73 +39,134 @@ class World:
 
     def __init__(self, vehicle: Vehicle, rate_hz: float, seed: int) -> None:
         self.vehicle = vehicle
-        self.steps_per_tick = max(1, math.ceil(1.0 / (rate_hz * LARGEST_STEP) - 1e-9))
+        self.steps_per_tick = step_count(vehicle, 1.0 / rate_hz)
         self.step = 1.0 / (rate_hz * self.steps_per_tick)
         self.state = initial_state(vehicle)
+        self.inner = initial_inner_state(vehicle)
+        self.reactions = np.zeros(REACTIONS_SIZE)
         self.rotor_speed = np.zeros(MOST_ROTORS)
         self.trim_controls = trim_controls(vehicle)
         self._seed = seed
+        self._speed_share = [1.0] * MOST_ROTORS
         self._record = parameters(vehicle)
         self._largest_speed = self._record["max_speed"][0]
-        self.measurement = np.zeros(1, dtype=MEASUREMENT)
+        self._truth = np.zeros(1, dtype=MEASUREMENT)
+        altitude = vehicle.home.altitude
+        slope = air_pressure(altitude + 0.5) - air_pressure(altitude - 0.5)
+        self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
+        self.measurement = self.instruments.reading
+        self._period = 1.0 / rate_hz
+        self._begin_sensing()
         self._force = HeldForce(vehicle.disturbance, self.step, seed)
+        self._wind = HeldWind(vehicle, self.step, seed)
+        work = np.zeros((WORK_ROWS, STATE_SIZE))
         self._advance = advance.bind(
-            self._record, self.state, self.rotor_speed, self._force.table, np.zeros((5, STATE_SIZE))
+            self._record,
+            self.state,
+            self.inner,
+            self.rotor_speed,
+            self._force.table,
+            self._wind.table,
+            work,
         )
         self._measure = measure.bind(
             self._record,
             self.state,
-            self.rotor_speed,
+            self.inner,
             self._force.now,
-            np.zeros(STATE_SIZE),
-            self.measurement,
+            self._wind.now,
+            work,
+            np.array(field_at(vehicle.home)),
+            self.reactions,
+            self._truth,
         )
         self.reset()
 
     def reset(self) -> None:
-        """Back to the initial state, with fresh random streams and the rotors as in hover."""
+        """Back to the initial state, with fresh random streams; in the air with the rotors as in hover."""
         self.state[:] = initial_state(self.vehicle)
+        self.inner[:] = initial_inner_state(self.vehicle)
         self._force.reset(self._seed)
-        self.command(self.trim_controls)
+        self._wind.reset(self._seed)
+        self.instruments.reset(self._seed)
+        self._begin_sensing()
+        self._speed_share = [1.0] * MOST_ROTORS
+        self.set_load_mass(None)
+        self.command(self.trim_controls if self.vehicle.initial.start == "hover" else STOPPED)
+
+    def _begin_sensing(self) -> None:
+        sensors, battery = self.vehicle.sensors, self.vehicle.battery
+        self.gps = GpsReceiver(sensors.gps, self._period, self._seed)
+        self.tracker = None
+        if sensors.tracker is not None:
+            self.tracker = LoadTracker(sensors.tracker, self._period, self._seed)
+        self._charge = battery.charge if battery is not None else 1.0
 
     def command(self, controls: Sequence[float]) -> None:
         """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""
         for i, (control, largest) in enumerate(zip(controls, self._largest_speed.tolist(), strict=True)):
             within = min(max(control, 0.0), 1.0) if math.isfinite(control) else 0.0
-            self.rotor_speed[i] = within * largest
+            self.rotor_speed[i] = within * largest * self._speed_share[i]
 
     def advance(self, steps: int) -> None:
         """Advance by so many integration steps with the rotors held."""
+        force, wind = self._force, self._wind
         while steps > 0:
-            first, rows_left = self._force.position(steps)
-            self._advance(first, self._force.hold_steps, rows_left, self.step)
-            self._force.advance(rows_left)
-            steps -= rows_left
+            covered = min(steps, force.steps_left, wind.steps_left)
+            self._advance(
+                force.next_step, wind.next_step, force.hold_steps, wind.hold_steps, covered, self.step
+            )
+            force.advance(covered)
+            wind.advance(covered)
+            steps -= covered
 
-    def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array]:
-        """Parameter record, state, rotor speeds and force as they change, for a log to read."""
-        return self._record, self.state, self.rotor_speed, self._force.now
+    def battery(self, duration: float) -> BatteryReading | None:
+        """Draw on the battery for `duration` seconds at the rotors' present speeds; None: there is none."""
+        battery = self.vehicle.battery
+        if battery is None:
+            return None
+        speeds = self.inner[: len(self.vehicle.rotors)].tolist()
+        now = reading(battery, self._charge, electric_power(self.vehicle, battery, speeds))
+        self._charge = drained(battery, self._charge, now.current, duration)
+        return now
 
-    def measure(self, held: bool, home_altitude: float) -> None:
-        """Fill `measurement` from the world as it is; a held vehicle measures as if it stood."""
-        self._measure(held, home_altitude)
+    def set_sensor(self, name: str, doing: int) -> None:
+        """Let a sensor work or fail, see `sensors.instruments`."""
+        if name == "gps":
+            self.gps.doing = doing
+        elif name != "tracker":
+            self.instruments.set(name, doing)
+        elif self.tracker is not None:
+            self.tracker.doing = doing
+
+    def set_rotor(self, index: int, thrust: float) -> None:
+        """Leave a rotor (from 0) a share of its thrust, at the same command."""
+        self._speed_share[index] = math.sqrt(thrust)
+
+    def release_cable(self) -> None:
+        """Join vehicle and load no more."""
+        self.inner[CABLE_HOLDS] = 0.0
+
+    def set_load_mass(self, mass: float | None) -> None:
+        """Change the load's mass, kg; None: as described."""
+        self._record["load_mass"] = self.vehicle.load.mass if mass is None else mass
+
+    def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array, Array]:
+        """Parameter record, state, inner state, commands and force as they change, for a log to read."""
+        return self._record, self.state, self.inner, self.rotor_speed, self._force.now
+
+    def measure(self, tick: int, held: bool) -> GpsFix | None:
+        """Fill `measurement` from the world as it is at a tick, to be called once for each in turn.
+
+        Returns the GPS fix that arrives at this tick, if any. A held vehicle measures as if it stood.
+        """
+        self._measure(held, self.vehicle.home.altitude)
+        self.instruments.read(tick)
+        return self.gps.sample(tick, self.state)
 
 
 def trim_controls(vehicle: Vehicle) -> tuple[float, ...]:
     """Controls (16) whose thrust carries vehicle and load without any moment."""
-    effect = np.array(
-        [
-            (
-                rotor.thrust_coefficient,
-                rotor.position[1] * rotor.thrust_coefficient,
-                -rotor.position[0] * rotor.thrust_coefficient,
-                (-1.0 if rotor.direction == "ccw" else 1.0) * rotor.torque_coefficient,
-            )
-            for rotor in vehicle.rotors
-        ]
-    ).T
-    squared, *_ = np.linalg.lstsq(effect, np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]), rcond=None)
-    speeds = np.sqrt(np.maximum(squared, 0.0))
     largest = np.array([rotor.max_speed for rotor in vehicle.rotors])
-    controls = np.minimum(speeds / largest, 1.0).tolist()
+    controls = np.minimum(np.array(hover_rotor_speeds(vehicle)) / largest, 1.0).tolist()
     return (*controls, *([0.0] * (MOST_ROTORS - len(controls))))

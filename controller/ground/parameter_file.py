@@ -1,0 +1,46 @@
+"""Parameters in a file: JSON, one object of names and numbers, written in one step."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+
+class ParameterFile:
+    """Where parameters are kept between two runs."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def load(self) -> tuple[dict[str, object], str]:
+        """The values, and what is wrong with the file (empty if nothing, also if there is none yet).
+
+        A file that cannot be read as what it should be is put aside, so that the next save does not lose it.
+        """
+        try:
+            values = json.loads(self._path.read_text(encoding="utf-8"))
+            if isinstance(values, dict):
+                return values, ""
+            fault = "not a table of names and numbers"
+        except FileNotFoundError:
+            return {}, ""
+        except (OSError, ValueError, RecursionError) as error:
+            fault = str(error)
+        aside = self._path.with_name(self._path.name + ".corrupt")
+        try:
+            os.replace(self._path, aside)
+        except OSError:
+            return {}, f"{self._path.name}: {fault}; defaults used"
+        return {}, f"{self._path.name}: {fault}; defaults used, file kept as {aside.name}"
+
+    def save(self, values: Mapping[str, float]) -> str:
+        """Write all values; returns what went wrong, or an empty string."""
+        draft = self._path.with_name(self._path.name + ".new")
+        try:
+            draft.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+            os.replace(draft, self._path)
+        except OSError as error:
+            return f"{self._path.name}: {error.strerror}"
+        return ""

@@ -1,0 +1,109 @@
+"""Who is served: every address that speaks, each with its own version, sequence, queue and streams."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from controller.ground.signing import Signing
+from controller.ground.streams import Streams
+from controller.ground.wire import Packed, frame, frame_v1
+from sitl_bridge.mavlink.framing import Frame
+
+SILENCE = 30.0
+"""s after which a peer that says nothing is forgotten; the standard ones start afresh."""
+MOST_PEERS = 16
+"""Peers at once; more are not served until one falls silent."""
+LONGEST_QUEUE = 1000
+"""Frames waiting for one peer; more are dropped, the oldest first."""
+
+
+class Address(NamedTuple):
+    """Where a peer is: one of our links (0: ground stations, 1: onboard) and its own host and port."""
+
+    link: int
+    host: str
+    port: int
+
+
+class Peer:
+    """What is known of one address, and what waits to be sent to it."""
+
+    def __init__(self, address: Address, standard: bool, now: float) -> None:
+        self.address = address
+        self.standard = standard
+        self.restart(now)
+
+    def restart(self, now: float) -> None:
+        """Forget everything: a new client is behind the address, or none yet."""
+        self.heard = False
+        self.last_heard = now
+        self.version = 0
+        """Largest MAVLink version heard; 0 until then, which is answered in version 2."""
+        self.last_station_heartbeat: float | None = None
+        """When a ground station (MAV_TYPE_GCS) was last heard here."""
+        self.streams = Streams(now)
+        self.queue: deque[bytes] = deque(maxlen=LONGEST_QUEUE)
+        self.sequences: dict[tuple[int, int], int] = {}
+        self.text_id = 0
+        self.last_texts: dict[str, float] = {}
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """Note that a good frame came."""
+        self.heard = True
+        self.last_heard = now
+        self.version = max(self.version, frame.version)
+
+    def send(self, message: Packed, system: int, component: int, signing: Signing | None, now: float) -> None:
+        """Frame a message for this peer, from one of our components, and queue it."""
+        source = (system, component)
+        sequence = self.sequences.get(source, 0)
+        if self.version == 1 and signing is None:
+            raw = frame_v1(*message, sequence, system, component)
+            if raw is None:
+                return
+        else:
+            raw = frame(*message, sequence, system, component, signing is not None)
+            if signing is not None:
+                raw = signing.sign(raw, self.address.link, now)
+        self.sequences[source] = sequence + 1 & 0xFF
+        self.queue.append(raw)
+
+    @property
+    def speaks_v1(self) -> bool:
+        """Whether it has spoken MAVLink 1 only."""
+        return self.version == 1
+
+
+class Peers:
+    """The table of peers: the standard ones, which are spoken to first, and whoever speaks."""
+
+    def __init__(self, standard: tuple[Address, ...], now: float) -> None:
+        self._table = {address: Peer(address, True, now) for address in standard}
+
+    def __iter__(self) -> Iterator[Peer]:
+        return iter(self._table.values())
+
+    def find(self, address: Address, now: float) -> Peer | None:
+        """The peer at an address, a new one if there is room, else None."""
+        peer = self._table.get(address)
+        if peer is None and len(self._table) < MOST_PEERS:
+            peer = self._table[address] = Peer(address, False, now)
+        return peer
+
+    def forget_silent(self, now: float) -> list[Address]:
+        """Forget peers that have been silent for too long; returns their addresses."""
+        silent = [peer for peer in self if peer.heard and now - peer.last_heard > SILENCE]
+        for peer in silent:
+            if peer.standard:
+                peer.restart(now)
+            else:
+                del self._table[peer.address]
+        return [peer.address for peer in silent]
+
+    @property
+    def last_station(self) -> float | None:
+        """When any ground station was last heard by its heartbeat."""
+        times = [peer.last_station_heartbeat for peer in self if peer.last_station_heartbeat is not None]
+        return max(times, default=None)

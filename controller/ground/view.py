@@ -1,0 +1,123 @@
+"""What the services know of the vehicle: its description once, its state as the control loop sees it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from sitl_bridge.frames import Geodetic, LocalOrigin, Quaternion, Triple
+from sitl_bridge.vehicle import Vehicle
+
+VEHICLE_COMPONENT = 1
+"""MAV_COMP_ID_AUTOPILOT1"""
+LOAD_COMPONENT = 35
+"""Component of the slung load, as ArduPilot's simulated one has it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """The facts about one vehicle that its services need."""
+
+    name: str
+    instance: int
+    origin: LocalOrigin
+    rest_length: float
+    """m, of the cable"""
+    hover_length: float
+    """m, of the cable with the load at rest on it"""
+    has_ground: bool
+    """False: there is nothing to land on (`paper`)."""
+
+    @property
+    def system(self) -> int:
+        """MAVLink system of the vehicle."""
+        return self.instance + 1
+
+    @property
+    def load_system(self) -> int:
+        """MAVLink system of the load."""
+        return self.instance + 101
+
+
+def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> Profile:
+    """The profile of a described vehicle."""
+    home = vehicle.home
+    return Profile(
+        vehicle.name,
+        instance,
+        LocalOrigin(home.latitude, home.longitude, home.altitude),
+        vehicle.cable.rest_length,
+        vehicle.hover_length,
+        has_ground,
+    )
+
+
+@dataclass(slots=True)
+class Health:
+    """Which sensors and estimates are there and good."""
+
+    gyroscope: bool = True
+    accelerometer: bool = True
+    magnetometer: bool = True
+    barometer: bool = True
+    gps: bool = True
+    attitude: bool = True
+    position: bool = True
+    load: bool = True
+
+
+@dataclass(slots=True)
+class Gps:
+    """The last fix of the receiver."""
+
+    fix_type: int = 3
+    satellites: int = 10
+    horizontal_accuracy: float = 1.0
+    """m"""
+    vertical_accuracy: float = 1.5
+    """m"""
+    position: Geodetic | None = None
+    """None: as the estimate has it."""
+    velocity: Triple | None = None
+    """m/s, ENU. None: as the estimate has it."""
+
+
+@dataclass(slots=True)
+class VehicleView:
+    """The vehicle as its control loop sees it now. World ENU from the origin, body FLU, SI units."""
+
+    time: float
+    """s since the autopilot's start, on the plant's clock"""
+    position: Triple
+    velocity: Triple
+    attitude: Quaternion
+    """FLU to ENU"""
+    body_rates: Triple
+    load_position: Triple
+    load_velocity: Triple
+    load_attached: bool = True
+    cable_taut: bool = True
+    vehicle_on_ground: bool = False
+    load_on_ground: bool = False
+    health: Health = field(default_factory=Health)
+    hil_age: float = 0.0
+    """s since the last HIL_SENSOR; inf before the first"""
+    throttle: float = 0.0
+    """collective, 0..1"""
+    battery_voltage: float = math.nan
+    """V"""
+    battery_current: float = math.nan
+    """A"""
+    battery_remaining: float = math.nan
+    """0..1"""
+    acceleration: Triple = (0.0, 0.0, 9.81)
+    """m/s², specific force in the body"""
+    gps: Gps = field(default_factory=Gps)
+    load_share: float = 0.0
+    """share of the loop's period that its work takes, 0..1"""
+
+    @property
+    def in_reach(self) -> bool:
+        """Whether the state is made of finite numbers within 1000 km."""
+        size = math.hypot(*self.position, *self.velocity, *self.load_position, *self.load_velocity)
+        return size < 1e6 and math.hypot(*self.attitude) < 2.0  # a NaN fails both

@@ -1,0 +1,116 @@
+"""Messages to bytes, MAVLink 2 or 1, and the two messages that pymavlink's `common` does not have yet."""
+
+from __future__ import annotations
+
+import binascii
+import importlib
+import struct
+from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from sitl_bridge.mavlink.framing import FLAG_SIGNED, MAGIC_V1, MAGIC_V2
+
+_BITS_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+LARGEST_V1_ID = 255
+
+
+def checksum(data: bytes) -> int:
+    """CRC-16/MCRF4XX: the reflected form of the CCITT polynomial that the standard library has."""
+    crc = binascii.crc_hqx(data.translate(_BITS_REVERSED), 0xFFFF)
+    return _BITS_REVERSED[crc >> 8] | _BITS_REVERSED[crc & 0xFF] << 8
+
+
+class AvailableModes(mavlink.MAVLink_message):  # type: ignore[misc]
+    """AVAILABLE_MODES (435) of the current `common` dialect."""
+
+    id = 435
+    crc_extra = 134
+    _layout = struct.Struct("<IIBBB35s")
+
+    def __init__(
+        self, count: int, index: int, standard: int, custom: int, properties: int, name: str
+    ) -> None:
+        super().__init__(self.id, "AVAILABLE_MODES")
+        self._fields = (custom, properties, count, index, standard, name.encode())
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
+
+
+class CurrentMode(mavlink.MAVLink_message):  # type: ignore[misc]
+    """CURRENT_MODE (436) of the current `common` dialect."""
+
+    id = 436
+    crc_extra = 193
+    _layout = struct.Struct("<IIB")
+
+    def __init__(self, standard: int, custom: int, intended: int) -> None:
+        super().__init__(self.id, "CURRENT_MODE")
+        self._fields = (custom, intended, standard)
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
+
+
+def payload_of(message: Any) -> bytes:
+    """The untruncated payload of a pymavlink message. Raises struct.error if a field does not fit."""
+    message._pack = lambda _mav, _extra, payload, force_mavlink1=False: payload
+    try:
+        return bytes(message.pack(None))
+    finally:
+        del message._pack
+
+
+class Packed(NamedTuple):
+    """A message as payload, ready to be framed for any peer."""
+
+    payload: bytes
+    message_id: int
+    crc_extra: int
+
+
+def packed(message: Any) -> Packed | None:
+    """Pack a message's fields, or pass on what is packed; None if a number does not fit its field."""
+    if isinstance(message, Packed):
+        return message
+    try:
+        return Packed(payload_of(message), message.get_msgId(), message.crc_extra)  # `id` may be a field
+    except (struct.error, OverflowError, ValueError):
+        return None
+
+
+def frame(
+    payload: bytes, message_id: int, crc_extra: int, sequence: int, system: int, component: int, signed: bool
+) -> bytes:
+    """A MAVLink 2 frame, without the signature that has to follow if `signed`."""
+    payload = payload.rstrip(b"\0") or payload[:1]
+    header = struct.pack(
+        "<BBBBBBHB",
+        len(payload),
+        FLAG_SIGNED if signed else 0,
+        0,
+        sequence,
+        system,
+        component,
+        message_id & 0xFFFF,
+        message_id >> 16,
+    )
+    body = header + payload
+    return b"%c%b%b" % (MAGIC_V2, body, checksum(body + bytes((crc_extra,))).to_bytes(2, "little"))
+
+
+def frame_v1(
+    payload: bytes, message_id: int, crc_extra: int, sequence: int, system: int, component: int
+) -> bytes | None:
+    """A MAVLink 1 frame: extension fields cut off. None if MAVLink 1 has no such message."""
+    if message_id > LARGEST_V1_ID:
+        return None
+    known = importlib.import_module("pymavlink.dialects.v10.common").mavlink_map.get(message_id)
+    if known is None:
+        return None
+    payload = payload[: known.unpacker.size]
+    body = bytes((len(payload), sequence, system, component, message_id)) + payload
+    return b"%c%b%b" % (MAGIC_V1, body, checksum(body + bytes((crc_extra,))).to_bytes(2, "little"))

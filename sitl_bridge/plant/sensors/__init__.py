@@ -1,0 +1,1 @@
+"""Sensors: truth, one draw of noise and what the sensor remembers make a measurement, in SI and ENU/FLU."""

@@ -1,0 +1,65 @@
+"""The load's tracker: where a camera under the vehicle sees the load, for LANDING_TARGET."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from sitl_bridge.frames import Quaternion, Triple, rotate_inverse
+from sitl_bridge.plant.sensors.instruments import WORKS
+from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
+from sitl_bridge.plant.streams import stream
+from sitl_bridge.sensors import Tracker
+
+
+class Sighting(NamedTuple):
+    """Where the load is seen from the vehicle: m, body FLU; `age` s, since the exposure."""
+
+    position: Triple
+    age: float
+
+
+def sighting(tracker: Tracker, x: Array, draw: Array, delay: float) -> Sighting | None:
+    """What the camera sees of the state x, or None: draw (3,) of unit normal numbers.
+
+    Noise is an angle across the line of sight, and a share of the distance along it.
+    """
+    w, qx, qy, qz = x[ATTITUDE].tolist()
+    attitude: Quaternion = (w, qx, qy, qz)
+    dx, dy, dz = (x[LOAD_POSITION] - x[VEHICLE_POSITION]).tolist()
+    seen = np.array(rotate_inverse(attitude, (dx, dy, dz)))
+    distance = float(np.linalg.norm(seen))
+    if distance == 0.0 or distance > tracker.range or -seen[2] < distance * math.cos(tracker.field_of_view):
+        return None
+    along = seen / distance
+    noise = distance * tracker.angle_noise * (draw - along * (along @ draw))
+    noise += distance * tracker.distance_noise * along * (along @ draw)
+    px, py, pz = (seen + noise).tolist()
+    return Sighting((px, py, pz), delay)
+
+
+class LoadTracker:
+    """The camera in time: `sample` at every tick gives the sighting that arrives then, if one does."""
+
+    def __init__(self, tracker: Tracker, tick_period: float, seed: int) -> None:
+        self.tracker = tracker
+        self.every = max(1, round(1.0 / (tracker.rate * tick_period)))
+        self.late = round(tracker.delay / tick_period)
+        self.doing = WORKS
+        """What the camera does, as of the instruments: anything but WORKS, and it sees nothing."""
+        self._delay = self.late * tick_period
+        self._under_way: deque[tuple[int, Sighting]] = deque()
+        self._white = stream(seed, "tracker.white")
+
+    def sample(self, tick: int, x: Array) -> Sighting | None:
+        """The sighting that arrives at `tick` (counted from 0 or 1, each once)."""
+        if tick % self.every == 0:
+            seen = sighting(self.tracker, x, self._white.standard_normal(3), self._delay)
+            if seen is not None and self.doing == WORKS:
+                self._under_way.append((tick + self.late, seen))
+        if self._under_way and self._under_way[0][0] <= tick:
+            return self._under_way.popleft()[1]
+        return None

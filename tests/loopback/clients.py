@@ -1,0 +1,122 @@
+"""What real clients do with a vehicle, pointed at any ports: MAVSDK-Python 4 and MAVProxy, unchanged."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+
+def free_udp_ports(count: int) -> list[int]:
+    """Ports that nobody has bound now."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [each.getsockname()[1] for each in sockets]
+    finally:
+        for each in sockets:
+            each.close()
+
+
+class Vehicle:
+    """A MAVSDK system with the plugins that the suite uses."""
+
+    def __init__(self, system: Any) -> None:
+        from mavsdk.asyncio.plugins.action import ActionAsync
+        from mavsdk.asyncio.plugins.info import InfoAsync
+        from mavsdk.asyncio.plugins.mission import MissionAsync
+        from mavsdk.asyncio.plugins.offboard import OffboardAsync
+        from mavsdk.asyncio.plugins.param import ParamAsync
+        from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+
+        self.system = system
+        self.action = ActionAsync(system)
+        self.info = InfoAsync(system)
+        self.mission = MissionAsync(system)
+        self.offboard = OffboardAsync(system)
+        self.param = ParamAsync(system)
+        self.telemetry = TelemetryAsync(system)
+
+
+@asynccontextmanager
+async def mavsdk_vehicle(connection: str, timeout: float = 10.0) -> AsyncIterator[Vehicle]:
+    """A vehicle on a MAVSDK connection string (`udpin://0.0.0.0:14540`)."""
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from mavsdk.logging import log_subscribe
+
+    log_subscribe(lambda level, message, file, line: True)
+    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    async with Mavsdk(configuration) as mavsdk:
+        await mavsdk.add_any_connection(connection)
+        system = await mavsdk.first_autopilot(timeout_s=timeout)
+        assert system is not None, f"no autopilot on {connection} within {timeout:g} s"
+        yield Vehicle(system)
+
+
+async def until(read: Callable[[], Any], holds: Callable[[Any], bool], timeout: float, what: str) -> Any:
+    """Read until a condition holds."""
+    deadline = time.monotonic() + timeout
+    value = None
+    while time.monotonic() < deadline:
+        value = await read()
+        if holds(value):
+            return value
+        await asyncio.sleep(0.1)
+    raise AssertionError(f"{what}: not within {timeout:g} s; last {value}")
+
+
+class MavProxy:
+    """mavproxy.py as a subprocess that takes commands and whose output is kept."""
+
+    def __init__(self, master: str, folder: Path) -> None:
+        program = Path(sys.executable).with_name("mavproxy.py")
+        self.log = folder / "mavproxy.txt"
+        self._out = self.log.open("wb")
+        self._process = subprocess.Popen(
+            [str(program), f"--master={master}", "--nowait", f"--state-basedir={folder}", "--default-modules="
+             "mode,arm,param,ftp,wp,cmdlong,misc,link,signing,rc"],
+            stdin=subprocess.PIPE,
+            stdout=self._out,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env={"PATH": "/usr/bin:/bin", "HOME": str(folder), "TERM": "dumb", "PYTHONUNBUFFERED": "1"},
+        )  # fmt: skip
+
+    def say(self, command: str) -> None:
+        """Type a line."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(command.encode() + b"\n")
+        self._process.stdin.flush()
+
+    def output(self) -> str:
+        """Everything it has printed."""
+        return self.log.read_text(errors="replace")
+
+    def wait_for(self, text: str, timeout: float = 15.0, after: int = 0) -> int:
+        """Wait until it prints a text behind a position; returns the position behind that."""
+        deadline = time.monotonic() + timeout
+        while time.monotonic() < deadline:
+            found = self.output().find(text, after)
+            if found >= 0:
+                return found + len(text)
+            time.sleep(0.05)
+        raise AssertionError(
+            f"MAVProxy did not print {text!r} within {timeout:g} s:\n{self.output()[-3000:]}"
+        )
+
+    def stop(self) -> None:
+        """End it."""
+        self._process.terminate()
+        try:
+            self._process.wait(5)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._out.close()
