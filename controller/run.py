@@ -62,7 +62,6 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
 
 
 def _loop(session: HilSession, link: Link, most_steps: int | None, stop: StopRequest) -> None:
-    gc.collect()
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     while not stop and (most_steps is None or session.steps < most_steps):
         received = link.receive(session.next_deadline())

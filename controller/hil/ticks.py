@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,7 +76,8 @@ def read_tick(
 ) -> int:
     """Read data[:length]; returns bits of what was found.
 
-    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written.
+    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written;
+    truth that is not finite is none.
     """
     count = scan(data, table, length)
     header[0] = count
@@ -98,6 +100,9 @@ def read_tick(
         header[1] = records[0].sensor.time_usec
     if found & VEHICLE_TRUTH and found & LOAD_TRUTH:
         estimate_from_truth(records[0].vehicle, records[0].load, estimate)
+        for i in range(STATE_SIZE):
+            if not math.isfinite(estimate[i]):
+                found &= ~VEHICLE_TRUTH
     return found
 
 

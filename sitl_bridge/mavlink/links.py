@@ -15,8 +15,8 @@ RECEIVE_BUFFER = 1 << 20
 KINDS = ("udpout", "udpin", "tcpin", "tcpout")
 Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]
 
-COARSE_WAIT = 0.01
-"""Waits of this length or more (s) are left to the socket's own time-out, one system call fewer."""
+COARSE_WAIT = 0.005
+"""Grain of the socket's own time-out, s: too coarse for a tick's deadline, one system call less otherwise."""
 LONGEST_WAIT = 0.1
 """A wait is cut to this (s), so that a process notices soon that it is asked to stop."""
 
@@ -62,8 +62,12 @@ class UdpLink:
 
     reliable = False
 
-    def __init__(self, address: Address) -> None:
-        """Raises OSError, naming the address, when the port is taken or the host unknown."""
+    def __init__(self, address: Address, punctual: bool = False) -> None:
+        """Raises OSError, naming the address, when the port is taken or the host unknown.
+
+        punctual: `receive` returns within microseconds of its deadline, at the price of a system call.
+        """
+        self._punctual = punctual
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         self._fixed = address.kind == "udpout"
@@ -99,15 +103,16 @@ class UdpLink:
 
     def receive(self, until: float) -> bytes | None:
         """The next datagram, or None when `time.monotonic()` reaches `until` first."""
-        wait = until - time.monotonic()
+        wait = min(until - time.monotonic(), LONGEST_WAIT)
         try:
-            if wait >= COARSE_WAIT:
+            if self._punctual and wait > 0.0:
+                if not select.select([self._socket], [], [], wait)[0]:
+                    return None
+                flags = int(socket.MSG_DONTWAIT)
+            elif wait > 0.0:
                 self._set_timeout(wait)
                 flags = 0
             else:
-                # The socket's own time-out is too coarse for a tick's deadline; select() is not.
-                if wait > 0.0 and not select.select([self._socket], [], [], wait)[0]:
-                    return None
                 flags = socket.MSG_DONTWAIT
             datagram, sender = self._socket.recvfrom(LARGEST_DATAGRAM, flags)
         except OSError:  # nothing came, or an earlier datagram could not be delivered
@@ -117,7 +122,7 @@ class UdpLink:
         return datagram
 
     def _set_timeout(self, wait: float) -> None:
-        coarse = math.floor(min(wait, LONGEST_WAIT) / COARSE_WAIT) * COARSE_WAIT
+        coarse = math.ceil(wait / COARSE_WAIT) * COARSE_WAIT
         if coarse != self._timeout:
             self._timeout = coarse
             value = struct.pack("ll", int(coarse), int(coarse % 1.0 * 1e6))
@@ -128,8 +133,8 @@ class UdpLink:
         self._socket.close()
 
 
-def open_link(address: Address, say: Callable[[str], None]) -> Link:
+def open_link(address: Address, say: Callable[[str], None], punctual: bool = False) -> Link:
     """Open the link of an address. Raises OSError when the port is taken or the host unknown."""
     if address.kind in ("udpin", "udpout"):
-        return UdpLink(address)
+        return UdpLink(address, punctual)
     raise OSError(f"{address}: TCP is not there yet")

@@ -370,3 +370,21 @@ def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -
     acts = p.two_way or slack_or_taut(p, x.real) > 0.0
     anchored = np.zeros(INNER_SIZE)
     rates(p, x, anchored, rotor_wrench(p, rotor_speed), acts, force, np.zeros(6), np.zeros(6), out)
+
+
+@entry_point(
+    Buffer(PARAMETERS, (1,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+)
+def set_rotors(record: Any, controls: Array, speed_share: Array, rotor_speed: Array) -> int:
+    """Commanded rotor speeds (n,), rad/s, from controls of 0..1; what is not finite means stopped.
+
+    speed_share: what each rotor gives of its commanded speed, 1 for a sound one.
+    """
+    for i in range(MOST_ROTORS):
+        control = controls[i]
+        within = min(max(control, 0.0), 1.0) if math.isfinite(control) else 0.0
+        rotor_speed[i] = within * record[0].max_speed[i] * speed_share[i]
+    return 0

@@ -94,7 +94,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         options.out.mkdir(parents=True, exist_ok=True)
         log = simulation.recorder = StateLog(options.out / FILE_NAME, simulation.world)
         tlog = TlogWriter(options.out / TLOG_NAME)
-    link = open_link(options.hil, speaker.say)
+    link = open_link(options.hil, speaker.say, punctual=options.clock == "realtime")
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
     notices = Notices(speaker.say)
@@ -127,7 +127,6 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
 def _loop(
     clock: Lockstep | Realtime, link: Link, tlog: TlogWriter | None, progress: Progress, stop: StopRequest
 ) -> None:
-    gc.collect()
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     epoch = time.time() - time.monotonic()
     clock.start(time.monotonic())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sitl_bridge.plant.battery import BatteryReading, drained, electric_power, reading
 from sitl_bridge.plant.disturbance import HeldForce, HeldWind
-from sitl_bridge.plant.dynamics import WORK_ROWS, advance
+from sitl_bridge.plant.dynamics import WORK_ROWS, advance, set_rotors
 from sitl_bridge.plant.parameters import parameters, step_count
 from sitl_bridge.plant.sensing import measure
 from sitl_bridge.plant.sensors.atmosphere import air_pressure
@@ -47,9 +47,7 @@ class World:
         self.rotor_speed = np.zeros(MOST_ROTORS)
         self.trim_controls = trim_controls(vehicle)
         self._seed = seed
-        self._speed_share = [1.0] * MOST_ROTORS
         self._record = parameters(vehicle)
-        self._largest_speed = self._record["max_speed"][0]
         self._truth = np.zeros(1, dtype=MEASUREMENT)
         altitude = vehicle.home.altitude
         slope = air_pressure(altitude + 0.5) - air_pressure(altitude - 0.5)
@@ -59,6 +57,9 @@ class World:
         self._begin_sensing()
         self._force = HeldForce(vehicle.disturbance, self.step, seed)
         self._wind = HeldWind(vehicle, self.step, seed)
+        self._controls = np.zeros(MOST_ROTORS)
+        self._speed_share = np.ones(MOST_ROTORS)
+        self._set_rotors = set_rotors.bind(self._record, self._controls, self._speed_share, self.rotor_speed)
         work = np.zeros((WORK_ROWS, STATE_SIZE))
         self._advance = advance.bind(
             self._record,
@@ -90,7 +91,7 @@ class World:
         self._wind.reset(self._seed)
         self.instruments.reset(self._seed)
         self._begin_sensing()
-        self._speed_share = [1.0] * MOST_ROTORS
+        self._speed_share[:] = 1.0
         self.set_load_mass(None)
         self.command(self.trim_controls if self.vehicle.initial.start == "hover" else STOPPED)
 
@@ -104,9 +105,8 @@ class World:
 
     def command(self, controls: Sequence[float]) -> None:
         """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""
-        for i, (control, largest) in enumerate(zip(controls, self._largest_speed.tolist(), strict=True)):
-            within = min(max(control, 0.0), 1.0) if math.isfinite(control) else 0.0
-            self.rotor_speed[i] = within * largest * self._speed_share[i]
+        self._controls[:] = controls
+        self._set_rotors()
 
     def advance(self, steps: int) -> None:
         """Advance by so many integration steps with the rotors held."""
