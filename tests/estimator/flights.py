@@ -212,7 +212,7 @@ def fly(
     )
     for k in range(ticks):
         now, held = k * PERIOD, k < HELD_TICKS
-        world.measure(held, 0.0)
+        world.measure(k, held)  # with the description's sensors, which are ideal
         ideal = world.measurement[0]
         state = world.state
         w, x, y, z = state[6:10]
