@@ -5,9 +5,13 @@ from __future__ import annotations
 import gc
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from controller.autopilot import Autopilot, PathFrom
+from controller.designs import ON_ESTIMATE
+from controller.estimate_log import EstimateLog
+from controller.feedback import EstimateFeedback
 from controller.hil.session import HilSession, new_session
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
@@ -28,6 +32,9 @@ class ControllerOptions:
     duration_s: float | None = None
     drop_percent: float = 0.0
     seed: int = 0
+    feedback: str = "truth"
+    out: Path | None = None
+    """Where the estimate's log goes."""
 
 
 def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
@@ -38,15 +45,19 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
+    log, feedback, design = None, None, options.design
+    if options.feedback == "estimate":
+        log = None if options.out is None else EstimateLog(options.out)
+        feedback = EstimateFeedback(options.vehicle, options.rate_hz, log)
+        design = ON_ESTIMATE if design == "default" else design
     session = new_session(
-        lambda controls: Autopilot(
-            options.vehicle, options.design, options.rate_hz, options.path_from, controls
-        ),
+        lambda controls: Autopilot(options.vehicle, design, options.rate_hz, options.path_from, controls),
         options.instance,
         speaker.say,
+        feedback,
     )
     speaker.say(
-        f"{options.vehicle.name}, {options.design} design at {options.rate_hz:g} Hz, "
+        f"{options.vehicle.name}, {options.design} design on {options.feedback} at {options.rate_hz:g} Hz, "
         f"waiting for a plant on {options.hil} (system {options.instance + 1})"
     )
     most_steps = None if options.duration_s is None else round(options.duration_s * options.rate_hz)
@@ -54,6 +65,8 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         _loop(session, link, most_steps, stop)
     finally:
         link.close()
+        if log is not None:
+            log.close()
     if stop:
         speaker.say(f"stopped by {stop.reason}")
     outcome = {"stopped_by": stop.reason, "control_steps": session.steps}

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ RATE_HZ = 250.0
 STEPS = 20_000
 TRIPS = 7_500
 FLIGHT_S = 30.0
+ON_ESTIMATE = ("--feedback", "estimate")
 
 
 def free_udp_port() -> int:
@@ -73,23 +75,25 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     return len(simulation.datagram()), len(writer.answer(4000, True))
 
 
-def lockstep_flight(scenario: str) -> dict[str, Any]:
+def lockstep_flight(scenario: str, feedback: Sequence[str] = ()) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     port = free_udp_port()
-    common = ["--scenario", scenario, "--rate", str(RATE_HZ)]
+    sensors = ["--set", "sensors.preset=consumer"] if feedback else []
+    common = ["--scenario", scenario, "--rate", str(RATE_HZ), *sensors]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
-    controller = [*common, "--hil", f"udpin:127.0.0.1:{port}"]
+    controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
     if outcome.failure:
         raise RuntimeError(outcome.failure)
     return outcome.end
 
 
-def launch_to_first_command_s() -> float:
+def launch_to_first_command_s(feedback: Sequence[str] = ()) -> float:
     """Time from the launch of `sitl fly` to the first rotor command at the plant, s."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "sitl", "fly", "hover", "--duration", "0.1", "--out", folder]
         command += ["--hil", f"udpout:127.0.0.1:{free_udp_port()}"]
+        command += feedback
         launched = time.time()
         subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
         summary = json.loads((Path(folder) / "summary.json").read_text())
@@ -112,6 +116,10 @@ def bench(repeats: int) -> dict[str, float]:
             "real_time_factor": factor,
             "launch_to_first_command_s": launch_to_first_command_s(),
         }
+        estimated = lockstep_flight("setpoint", ON_ESTIMATE)["real_time_factor"]
+        measured["lockstep_tick_us_estimate"] = 1e6 / (estimated * RATE_HZ)
+        measured["real_time_factor_estimate"] = estimated
+        measured["launch_to_first_command_s_estimate"] = launch_to_first_command_s(ON_ESTIMATE)
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():
             samples.setdefault(key, []).append(value)

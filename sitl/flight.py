@@ -58,6 +58,7 @@ class FlightOptions:
         plant += ["--drop", repr(self.drop_percent), "--out", str(self.out)]
         other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
         controller = [*common, "--hil", str(other_end), "--design", self.design, "--feedback", self.feedback]
+        controller += ["--out", str(self.out)]
         return plant, controller
 
 
@@ -107,4 +108,4 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
     path = scenario.reference.path(start)
-    return write_report(options.out, facts, path)
+    return write_report(options.out, facts, path, vehicle if options.feedback == "estimate" else None)

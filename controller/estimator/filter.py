@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from controller.estimator import step
+from controller.estimator import intake, step
 from controller.estimator.layout import (
     ALIGNING,
     ERROR_SIZE,
+    EULER_OUT,
     FILTER,
     FLYING,
     INPUT,
@@ -28,6 +31,7 @@ from controller.estimator.layout import (
 from controller.estimator.tuning import CONSUMER, Tuning, parameters
 from sitl_bridge.vehicle import Vehicle
 
+YAW = EULER_OUT + 2
 Sequence3 = tuple[float, float, float] | Array
 
 
@@ -94,6 +98,8 @@ class Estimator:
         self._change = step.change.bind(self._filter)
         self._command = step.command.bind(self._filter, self._rotor_speed)
         self.memory = self._filter[0]["m"]
+        self._sensed: NDArray[Any] | None = None
+        self._give: Callable[[], int] = int
         self.reset()
 
     def reset(self, *, in_flight: bool = False) -> None:
@@ -121,6 +127,13 @@ class Estimator:
         """Pressure altitude in m above home (any constant offset), sampled at this tick."""
         self.given["altitude"] = altitude
         self.given["has_altitude"] = True
+
+    def sensed(self, record: NDArray[Any]) -> None:
+        """What the HIL link has of these: a record of `hil.ticks.SENSED`, shape (1,), to be kept."""
+        if record is not self._sensed:
+            self._sensed = record
+            self._give = intake.give.bind(record, self._record)
+        self._give()
 
     def gps(
         self,
@@ -199,9 +212,14 @@ class Estimator:
         return np.asarray(self._filter["P"][0])
 
     def covariance(self) -> Array:
-        """Covariance (18, 18) of `state()`, eq. 31."""
+        """Covariance (18, 18) of `state()`, eq. 31.
+
+        Of the heading it has what the filter cannot learn too: the magnetometer's lasting error.
+        """
         selector = eq31_jacobian(self._output[15], self._output[16])
-        return np.asarray(selector @ self.error_covariance @ selector.T)
+        out = np.asarray(selector @ self.error_covariance @ selector.T)
+        out[YAW, YAW] += self.tuning.heading_bias_std**2
+        return out
 
     def health(self) -> Health:
         """A summary for arming, failsafes, SYS_STATUS and ESTIMATOR_STATUS."""

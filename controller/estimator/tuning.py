@@ -36,6 +36,8 @@ class Tuning:
     """rad/s"""
     magnetometer_std: float = 0.05
     """rad, of heading"""
+    heading_bias_std: float = 0.0
+    """rad, of what a lasting error of the magnetometer turns the heading by; nothing on board shows it"""
     barometer_std: float = 0.3
     """m"""
     gps_position_std: Triple = (0.5, 0.5, 0.8)
@@ -123,12 +125,23 @@ class Receiver(Protocol):
 class Suite(Protocol):
     """What a vehicle senses with."""
 
-    accelerometer: Any
-    gyroscope: Any
-    magnetometer: Any
-    barometer: Any
-    gps: Any
-    tracker: Any
+    @property
+    def accelerometer(self) -> Any: ...
+
+    @property
+    def gyroscope(self) -> Any: ...
+
+    @property
+    def magnetometer(self) -> Any: ...
+
+    @property
+    def barometer(self) -> Any: ...
+
+    @property
+    def gps(self) -> Any: ...
+
+    @property
+    def tracker(self) -> Any: ...
 
 
 def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> Tuning:
@@ -154,6 +167,7 @@ def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> 
         accelerometer_std=std(accelerometer, 0.02),
         gyroscope_std=std(gyroscope, 1e-3),
         magnetometer_std=std(sensors.magnetometer, 0.0) / math.hypot(field[0], field[1]) + 1e-3,
+        heading_bias_std=sensors.magnetometer.bias / math.hypot(field[0], field[1]),
         barometer_std=std(barometer, 0.02),
         gps_position_std=(horizontal, horizontal, vertical),
         gps_velocity_std=(across, across, up),

@@ -1,0 +1,131 @@
+"""What the law flies on: the plant's truth, or the estimate from its sensors."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from controller.estimate_log import EstimateLog
+from controller.estimator.filter import Estimator
+from controller.estimator.tuning import Tuning, from_sensors
+from controller.hil.ticks import Tick, TickReader
+from controller.model import rotor_time_constant
+from controller.state import Array
+from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin, fix_from_wire
+from sitl_bridge.magnetic import field_at
+from sitl_bridge.vehicle import Vehicle
+
+ALIGNMENT_TIME = 1.0
+"""From the first tick, or from the one with which the plant's sensors began, to arming, s."""
+_GPS_PARTS = 16
+"""A fix belongs to the nearest sixteenth of a tick: the wire's microseconds depend on when it was started."""
+_FIX_3D = 3
+
+
+class Feedback(Protocol):
+    """Makes an estimate (18,) in the order of eq. 31 out of each tick."""
+
+    name: str
+    needs_truth: bool
+    """Whether the plant is to be asked for ODOMETRY."""
+
+    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+        """The estimate at a new tick; None while there is none to fly on."""
+
+    def flown(self, controls: Array) -> None:
+        """The tick was answered, armed, with these controls (16,)."""
+
+    def restart(self) -> None:
+        """Another plant, or the same one from its beginning."""
+
+
+class TruthFeedback:
+    """The plant's own truth."""
+
+    name = "truth"
+    needs_truth = True
+
+    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+        """The state that the plant says it is in."""
+        return reader.estimate if tick.truth else None
+
+    def flown(self, controls: Array) -> None:
+        """Truth does not need to know."""
+
+    def restart(self) -> None:
+        """Nor does it remember."""
+
+
+def tuning_for(vehicle: Vehicle, rate_hz: float) -> Tuning:
+    """What the filter assumes of the sensors and surroundings that a vehicle description has."""
+    return from_sensors(
+        vehicle.sensors,
+        rate_hz,
+        field_at(vehicle.home),
+        has_ground=vehicle.ground is not None,
+        rotor_time_constant=rotor_time_constant(vehicle),
+    )
+
+
+class EstimateFeedback:
+    """The estimator on HIL_SENSOR and HIL_GPS.
+
+    It aligns at rest from the tick on with which the plant's sensors begin (HIL_SENSOR_UPDATED_RESET), and
+    counts time in ticks from there, so that in lockstep the flight does not depend on who was started when.
+    """
+
+    name = "estimate"
+    needs_truth = False
+
+    def __init__(self, vehicle: Vehicle, rate_hz: float, log: EstimateLog | None = None) -> None:
+        self.estimator = Estimator(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
+        self._rate_hz = rate_hz
+        self._log = log
+        self._origin = LocalOrigin(vehicle.home.latitude, vehicle.home.longitude, vehicle.home.altitude)
+        self._largest_speeds = np.array([rotor.max_speed for rotor in vehicle.rotors])
+        self.restart()
+
+    def restart(self) -> None:
+        """Align anew with the next tick."""
+        self.estimator.reset()
+        self._flying = False
+        self._first_usec: int | None = None
+        self._tick = self._first_flown = 0
+        self._last_gps_usec = 0
+
+    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+        """The estimate at a new tick, once it is aligned and good enough to fly on."""
+        if reader.begun:
+            self.restart()
+        if self._first_usec is None:
+            self._first_usec = time_usec
+        ticks = self._rate_hz / MICROSECONDS_PER_SECOND
+        self._tick = round((time_usec - self._first_usec) * ticks)
+        estimator = self.estimator
+        estimator.sensed(reader.sensed)
+        if tick.gps and reader.gps["fix_type"] >= _FIX_3D:
+            valid_usec = int(reader.gps["time_usec"])
+            valid_tick = round((valid_usec - self._first_usec) * ticks * _GPS_PARTS) / _GPS_PARTS
+            if valid_usec > self._last_gps_usec and valid_tick >= 0.0:
+                self._last_gps_usec = valid_usec
+                position, velocity = fix_from_wire(reader.gps, self._origin)
+                estimator.gps(valid_tick / self._rate_hz, position, velocity)
+        estimate = estimator.tick(self._tick / self._rate_hz)
+        return estimate if self._flying or self._ready() else None
+
+    def flown(self, controls: Array) -> None:
+        """Note what the rotors are told; the first time, that the vehicle flies."""
+        if not self._flying:
+            self._flying = True
+            self._first_flown = self._tick
+            self.estimator.take_off()
+        if self._log is not None:
+            self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
+        self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
+
+    def _ready(self) -> bool:
+        if self._tick < round(ALIGNMENT_TIME * self._rate_hz):
+            return False
+        health = self.estimator.health()
+        return health.attitude and health.velocity and health.position
