@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from controller.state import WRENCH_SIZE, Array
 from sitl_bridge.compiled import kernel
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.vehicle import Vehicle
 
-MOST_ROTORS = 16  # as many as HIL_ACTUATOR_CONTROLS has controls
+MOST_ROTORS = ACTUATOR_CONTROLS
 
 ALLOCATION = np.dtype(
     [

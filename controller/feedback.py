@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from pymavlink.dialects.v20.common import MAVLINK_MSG_ID_LANDING_TARGET
 
 from controller.estimate_log import EstimateLog
 from controller.estimator.filter import Estimator
@@ -12,14 +13,19 @@ from controller.estimator.tuning import Tuning, from_sensors
 from controller.hil.ticks import Tick, TickReader
 from controller.model import rotor_time_constant
 from controller.state import Array
-from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin, fix_from_wire
+from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin, fix_from_wire, flu_to_frd
 from sitl_bridge.magnetic import field_at
+from sitl_bridge.mavlink.framing import decode
+from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
 from sitl_bridge.vehicle import Vehicle
 
 ALIGNMENT_TIME = 1.0
 """From the first tick, or from the one with which the plant's sensors began, to arming, s."""
-_GPS_PARTS = 16
-"""A fix belongs to the nearest sixteenth of a tick: the wire's microseconds depend on when it was started."""
+_PARTS = 16
+"""Late measurements belong to the nearest sixteenth of a tick: the wire's microseconds are rounded, and how
+depends on when the plant was started."""
+_LEAST_STD = 0.005
+"""m; no tracker is taken for better."""
 _FIX_3D = 3
 
 
@@ -81,6 +87,7 @@ class EstimateFeedback:
     def __init__(self, vehicle: Vehicle, rate_hz: float, log: EstimateLog | None = None) -> None:
         self.estimator = Estimator(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
         self._rate_hz = rate_hz
+        self._tracker = vehicle.sensors.tracker
         self._log = log
         self._origin = LocalOrigin(vehicle.home.latitude, vehicle.home.longitude, vehicle.home.altitude)
         self._largest_speeds = np.array([rotor.max_speed for rotor in vehicle.rotors])
@@ -106,11 +113,14 @@ class EstimateFeedback:
         estimator.sensed(reader.sensed)
         if tick.gps and reader.gps["fix_type"] >= _FIX_3D:
             valid_usec = int(reader.gps["time_usec"])
-            valid_tick = round((valid_usec - self._first_usec) * ticks * _GPS_PARTS) / _GPS_PARTS
-            if valid_usec > self._last_gps_usec and valid_tick >= 0.0:
+            valid_s = self._seconds(valid_usec)
+            if valid_usec > self._last_gps_usec and valid_s >= 0.0:
                 self._last_gps_usec = valid_usec
                 position, velocity = fix_from_wire(reader.gps, self._origin)
-                estimator.gps(valid_tick / self._rate_hz, position, velocity)
+                estimator.gps(valid_s, position, velocity)
+        for frame in tick.others:
+            if frame.message_id == MAVLINK_MSG_ID_LANDING_TARGET:
+                self._see_load(decode(frame))
         estimate = estimator.tick(self._tick / self._rate_hz)
         return estimate if self._flying or self._ready() else None
 
@@ -123,6 +133,21 @@ class EstimateFeedback:
         if self._log is not None:
             self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
         self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
+
+    def _seconds(self, time_usec: int) -> float:
+        """A time of the wire on the filter's clock, s."""
+        assert self._first_usec is not None
+        ticks = (time_usec - self._first_usec) * self._rate_hz / MICROSECONDS_PER_SECOND
+        return round(ticks * _PARTS) / _PARTS / self._rate_hz
+
+    def _see_load(self, target: Any) -> None:
+        """LANDING_TARGET of the tracker: the load from the vehicle, BODY_FRD."""
+        if self._tracker is None or not target.position_valid or target.frame != FRAME_BODY_FRD:
+            return
+        across = max(_LEAST_STD, self._tracker.angle_noise * target.distance)
+        along = max(_LEAST_STD, self._tracker.distance_noise * target.distance)
+        position = flu_to_frd((target.x, target.y, target.z))
+        self.estimator.load_seen(self._seconds(target.time_usec), position, (across, across, along))
 
     def _ready(self) -> bool:
         if self._tick < round(ALIGNMENT_TIME * self._rate_hz):

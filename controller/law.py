@@ -21,6 +21,7 @@ from controller.flatness import BODY, STENCIL, flat_motion
 from controller.reference import path_derivatives
 from controller.state import STATE_SIZE, WRENCH_SIZE, Array
 from sitl_bridge.compiled import kernel
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 
 LONGEST_DELAY = 64
 """Most ticks of loop delay that a design can predict over."""
@@ -65,7 +66,7 @@ WORK = np.dtype(
         ("feedforward", "f8", WRENCH_SIZE),  # u*
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
-        ("rotors", "f8", (2, 16)),
+        ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("stencil", STENCIL),
     ]
 )

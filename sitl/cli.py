@@ -9,15 +9,16 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from sitl_bridge.ids import HIL_UDP_PORT, MOST_INSTANCES
+from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.process import Speaker, StopRequest
-from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, vehicle_names
+from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, preset_names, vehicle_names
 
 if TYPE_CHECKING:
     from sitl.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.plant.faults import Faults
 
 DEFAULT_RATE_HZ = 250.0
 DESIGNS = ("default", "paper", "paper-lqr")
@@ -53,14 +54,23 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
     return parse
 
 
-def link_address(text: str) -> Address:
-    """An argument type: the address of a link."""
+def link_address(text: str) -> str:
+    """An argument type: the address of a link, the port perhaps left out."""
     from sitl_bridge.mavlink.links import parse_address
 
     try:
-        return parse_address(text)
+        parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
+def host_and_port(text: str) -> tuple[str, int]:
+    """An argument type: HOST:PORT."""
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, as in 127.0.0.1:14550")
+    return host, int(port)
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -72,6 +82,7 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="Two terminals, in either order: `sitl plant --scenario setpoint` and "
         "`sitl controller --scenario setpoint`. Both at once, with a report: `sitl fly setpoint`.",
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {_version()}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     fly = commands.add_parser(
@@ -100,6 +111,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     for add in (_scenario, _vehicle, _link, _clock, _loop, _run, _output, _supervised):
         add(plant)
+    plant.add_argument(
+        "--load-to",
+        metavar="HOST:PORT",
+        type=host_and_port,
+        help="show the load to a ground station directly, for an autopilot that does not (PX4)",
+    )
     plant.set_defaults(run=_plant)
 
     controller = commands.add_parser(
@@ -126,7 +143,29 @@ def build_parser() -> argparse.ArgumentParser:
         "--repeats", type=whole(1, 100, "a number"), default=5, help="measurements of each, for the median"
     )
     bench.set_defaults(run=_bench)
+
+    paper = commands.add_parser(
+        "paper",
+        help="run every experiment of the paper, and write a page with a verdict on each",
+        description="Run every experiment of the paper, over the real link where a controller flies; write "
+        "DIR/index.html and DIR/paper.json: what the paper shows, what we get, and a verdict on each claim. "
+        "Exit code 1 when a number is out of its tolerance.",
+    )
+    paper.add_argument(
+        "--out", metavar="DIR", type=Path, required=True, help="where to write page and numbers"
+    )
+    paper.add_argument("--quick", action="store_true", help="coarser sweeps, shorter flights: under a minute")
+    paper.set_defaults(run=_paper)
     return parser
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("sitl-bridge")
+    except PackageNotFoundError:  # run from a source tree that nobody has installed
+        return "unknown"
 
 
 def _scenario_names() -> list[str]:
@@ -154,6 +193,11 @@ def _vehicle(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="override one value of the vehicle description, as in cable.rest_length=10 (repeatable)",
     )
+    parser.add_argument(
+        "--sensors",
+        metavar="PRESET",
+        help=f"what its sensors are like: {', '.join(preset_names())}; as --set sensors.preset=PRESET",
+    )
 
 
 def _link(parser: argparse.ArgumentParser) -> None:
@@ -162,7 +206,8 @@ def _link(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         type=link_address,
         help="HIL link: udpout:HOST:PORT, udpin:…, tcpin:… or tcpout:…; for `fly` the plant's end of it "
-        f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first)",
+        f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first; "
+        f"an address may leave out its port, {HIL_TCP_PORT}+N for TCP, and host)",
     )
     parser.add_argument(
         "--instance",
@@ -254,15 +299,16 @@ def _supervised(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _hil_address(arguments: argparse.Namespace, kind: Any) -> Address:
-    from sitl_bridge.mavlink.links import Address
+def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
+    from sitl_bridge.mavlink.links import parse_address
 
-    default = Address(kind, "127.0.0.1", HIL_UDP_PORT + arguments.instance)
-    return arguments.hil or default
+    udp_port, tcp_port = HIL_UDP_PORT + arguments.instance, HIL_TCP_PORT + arguments.instance
+    return parse_address(arguments.hil or kind, udp_port, tcp_port)
 
 
-def _what_to_fly(arguments: argparse.Namespace, overrides: Sequence[str]) -> tuple[Vehicle, Scenario | None]:
+def _what_to_fly(arguments: argparse.Namespace) -> tuple[Vehicle, Scenario | None]:
     """Vehicle and scenario of `plant` and `controller`."""
+    overrides = _overrides(arguments)
     if arguments.scenario is None:
         return load_vehicle(arguments.vehicle or "paper", overrides), None
     from sitl.scenario import load_scenario, scenario_vehicle
@@ -271,10 +317,22 @@ def _what_to_fly(arguments: argparse.Namespace, overrides: Sequence[str]) -> tup
     return scenario_vehicle(scenario, arguments.vehicle, overrides), scenario
 
 
+def _overrides(arguments: argparse.Namespace) -> list[str]:
+    """--sensors and --set, in this order, so that single figures change the preset."""
+    preset = [] if arguments.sensors is None else [f"sensors.preset={arguments.sensors}"]
+    return [*preset, *arguments.set]
+
+
+def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
+    from sitl_bridge.plant.faults import Faults, checked
+
+    return Faults() if scenario is None else checked(scenario.faults, vehicle)
+
+
 def _plant(arguments: argparse.Namespace) -> int:
     if arguments.speed is not None and arguments.clock != "lockstep":
         raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
-    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    vehicle, scenario = _what_to_fly(arguments)
     from sitl_bridge.plant.run import PlantOptions, run
 
     speaker = Speaker("plant", events=arguments.until_eof)
@@ -292,6 +350,8 @@ def _plant(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         on_silence=arguments.on_silence,
         out=arguments.out,
+        faults=_faults_of(scenario, vehicle),
+        load_to=arguments.load_to,
     )
     outcome = run(options, speaker, stop)
     if arguments.json and not arguments.until_eof:
@@ -300,7 +360,7 @@ def _plant(arguments: argparse.Namespace) -> int:
 
 
 def _controller(arguments: argparse.Namespace) -> int:
-    vehicle, scenario = _what_to_fly(arguments, arguments.set)
+    vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
     from sitl.scenario import Hover
 
@@ -338,7 +398,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         scenario_name=arguments.scenario,
         scenario=load_scenario(arguments.scenario),
         vehicle=arguments.vehicle,
-        overrides=arguments.set,
+        overrides=_overrides(arguments),
         plant_overrides=arguments.plant_set,
         hil=_hil_address(arguments, "udpout"),
         clock=arguments.clock,
@@ -374,6 +434,12 @@ def _bench(arguments: argparse.Namespace) -> int:
     results = bench(arguments.repeats)
     print(json.dumps(results, indent=2) if arguments.json else table(results))
     return 0
+
+
+def _paper(arguments: argparse.Namespace) -> int:
+    from sitl.paper.run import main as paper
+
+    return paper(arguments.out, arguments.quick)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -11,6 +11,7 @@ from typing import Any
 from sitl.fly import Pair, ProgressLine, watch
 from sitl.scenario import Scenario, scenario_vehicle
 from sitl_bridge.mavlink.links import Address
+from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
 
 MIRRORED: dict[str, Any] = {"udpout": "udpin", "udpin": "udpout", "tcpin": "tcpout", "tcpout": "tcpin"}
@@ -66,7 +67,8 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
     """Fly; returns the summary, which is also in the output folder. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    flown = scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    checked(scenario.faults, flown)
     options.out.mkdir(parents=True, exist_ok=True)
     line = ProgressLine(sys.stderr)
     start = vehicle.initial.load_position

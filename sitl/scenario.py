@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
+from sitl_bridge.plant.faults import Faults
 from sitl_bridge.schema import Section, Vector, quantity
 from sitl_bridge.vehicle import Vehicle, load_vehicle, read_toml, shipped, validated
 
@@ -66,6 +67,7 @@ class Scenario(Section):
     set: tuple[str, ...] = quantity("-", "overrides of the vehicle, KEY=VALUE", ())
     duration: float | None = quantity("s", "how long it flies; without it, until it is stopped", None, gt=0)
     reference: Reference
+    faults: Faults = Faults()
 
 
 def scenario_names() -> list[str]:

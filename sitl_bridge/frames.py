@@ -27,6 +27,8 @@ CENTIDEGREES_PER_RADIAN = 100.0 * 180.0 / math.pi
 MICROSECONDS_PER_SECOND = 1e6
 HECTOPASCALS_PER_PASCAL = 1e-2
 GAUSS_PER_TESLA = 1e4
+STANDARD_GRAVITY = 9.80665
+MILLI_G_PER_METRE_PER_SECOND_SQUARED = 1e3 / STANDARD_GRAVITY
 
 _HALF = math.sqrt(0.5)
 
@@ -132,6 +134,11 @@ class LocalOrigin:
         self._degrees_per_metre_east = math.degrees(
             1.0 / ((normal + altitude) * math.cos(math.radians(latitude)))
         )
+
+    @property
+    def degrees_per_metre(self) -> tuple[float, float]:
+        """Of longitude to the east, and of latitude to the north."""
+        return self._degrees_per_metre_east, self._degrees_per_metre_north
 
     def geodetic(self, position: Triple) -> Geodetic:
         """Position in ENU metres from home, as latitude and longitude (deg) and altitude (m)."""

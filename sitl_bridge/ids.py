@@ -1,10 +1,13 @@
-"""Who is who on the wire: MAVLink system and component ids and UDP ports of instance N."""
+"""Who is who on the wire: MAVLink system and component ids, UDP ports of instance N, number of controls."""
 
 from __future__ import annotations
 
 COMPONENT_AUTOPILOT = 1
 COMPONENT_TRUTH = 191  # MAV_COMP_ID_ONBOARD_COMPUTER: the plant speaking about the vehicle
 COMPONENT_LOAD = 35  # ArduPilot's precedent for a simulated slung payload
+
+ACTUATOR_CONTROLS = 16
+"""Controls in HIL_ACTUATOR_CONTROLS: the most rotors that a vehicle can have."""
 
 HIL_UDP_PORT = 14560
 HIL_TCP_PORT = 4560

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.schema import Section, Vector, quantity
 from sitl_bridge.sensors import Sensors
 
@@ -164,7 +165,7 @@ class Vehicle(Section):
     gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
     airframe: Airframe
     rotors: tuple[Rotor, ...] = quantity(
-        "-", "in the order of the actuator controls", min_length=4, max_length=16
+        "-", "in the order of the actuator controls", min_length=4, max_length=ACTUATOR_CONTROLS
     )
     cable: Cable
     load: Load
@@ -253,6 +254,11 @@ def shipped(folder: Any) -> list[str]:
 def vehicle_names() -> list[str]:
     """Names of the vehicles that come with the package."""
     return shipped(resources.files(__package__) / "vehicles")
+
+
+def preset_names() -> list[str]:
+    """Names of the sensor presets that come with the package."""
+    return shipped(resources.files(__package__) / "presets")
 
 
 def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str, Any]]:

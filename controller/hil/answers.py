@@ -7,20 +7,19 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.ids import ACTUATOR_CONTROLS, COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Bytes, Packer, write_frame
 from sitl_bridge.mavlink.hil import FLAG_LOCKSTEP, HIL_ACTUATOR_CONTROLS, MODE_FLAG_ARMED
 
 _ANSWER_ID = HIL_ACTUATOR_CONTROLS.message_id
 _PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
-CONTROLS = 16
 ANSWER_SIZE = 128  # a frame of 81 bytes of payload, with room
 
 
 @entry_point(
     Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
     Buffer(np.uint8, (_PAYLOAD_SIZE,)),
-    Buffer(np.float64, (CONTROLS,)),
+    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
     Buffer(np.uint8, (ANSWER_SIZE,)),
     int,
     int,
@@ -42,7 +41,7 @@ def write_answer(
     record.time_usec = time_usec
     record.flags = FLAG_LOCKSTEP
     record.mode = MODE_FLAG_ARMED if armed else 0
-    for i in range(CONTROLS):
+    for i in range(ACTUATOR_CONTROLS):
         record.controls[i] = controls[i] if armed else 0.0
     return int(write_frame(out, 0, payload, _ANSWER_ID, sequence, system, COMPONENT_AUTOPILOT))
 
@@ -51,7 +50,7 @@ class AnswerWriter:
     """Builds answers of one instance; `controls` (16,) is what the next one carries."""
 
     def __init__(self, instance: int, packer: Packer) -> None:
-        self.controls = np.zeros(CONTROLS)
+        self.controls = np.zeros(ACTUATOR_CONTROLS)
         self._system = vehicle_system(instance)
         self._packer = packer
         record, payload = HIL_ACTUATOR_CONTROLS.record()

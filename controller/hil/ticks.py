@@ -33,7 +33,7 @@ from sitl_bridge.mavlink.framing import (
     read_payload,
     scan,
 )
-from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, ODOMETRY, SENSOR_RESET
+from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
 
 INCOMING = np.dtype(
     [
@@ -59,6 +59,7 @@ SENSED = np.dtype(
 _IMU_BITS, _MAGNETOMETER_BITS, _ALTITUDE_BIT = 0x3F, 0x1C0, 0x800
 """Of HIL_SENSOR.fields_updated."""
 _SENSOR_ID, _GPS_ID, _ODOMETRY_ID = HIL_SENSOR.message_id, HIL_GPS.message_id, ODOMETRY.message_id
+_STATE_ID = HIL_STATE_QUATERNION.message_id
 _SENSOR_SIZE, _ODOMETRY_SIZE = HIL_SENSOR.dtype.itemsize, ODOMETRY.dtype.itemsize
 _LOAD_AT, _GPS_AT = _SENSOR_SIZE + _ODOMETRY_SIZE, _SENSOR_SIZE + 2 * _ODOMETRY_SIZE
 
@@ -147,7 +148,7 @@ def read_tick(
         elif message_id == _GPS_ID:
             read_payload(data, table[i], payloads[_GPS_AT:])
             found |= GPS
-        else:
+        elif message_id != _STATE_ID:
             found |= OTHERS
     if found & TICK:
         header[1] = records[0].sensor.time_usec
@@ -206,7 +207,7 @@ class TickReader:
         others: list[Frame] = []
         if found & OTHERS:
             rows = self._table[: self._header[0]].tolist()
-            known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID)
+            known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID, _STATE_ID)
             others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] not in known]
         truth = bool(found & VEHICLE_TRUTH and found & LOAD_TRUTH)
         return Tick(int(self._header[1]) if found & TICK else None, truth, bool(found & GPS), others)

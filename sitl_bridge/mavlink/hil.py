@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.ids import ACTUATOR_CONTROLS
+
 Record = NDArray[np.void]
 
 
@@ -52,7 +54,7 @@ HIL_GPS = _layout(
 )
 
 HIL_ACTUATOR_CONTROLS = _layout(
-    93, ("time_usec", "<u8"), ("flags", "<u8"), ("controls", "<f4", 16), ("mode", "u1")
+    93, ("time_usec", "<u8"), ("flags", "<u8"), ("controls", "<f4", ACTUATOR_CONTROLS), ("mode", "u1")
 )
 
 ODOMETRY = _layout(
@@ -65,6 +67,17 @@ ODOMETRY = _layout(
     ("velocity_covariance", "<f4", 21),
     *((name, "u1") for name in ("frame_id", "child_frame_id", "reset_counter", "estimator_type")),
     ("quality", "i1"),
+)
+
+HIL_STATE_QUATERNION = _layout(
+    115,
+    ("time_usec", "<u8"),
+    ("attitude_quaternion", "<f4", 4),
+    *((name, "<f4") for name in ("rollspeed", "pitchspeed", "yawspeed")),
+    *((name, "<i4") for name in ("lat", "lon", "alt")),
+    *((name, "<i2") for name in ("vx", "vy", "vz")),
+    *((name, "<u2") for name in ("ind_airspeed", "true_airspeed")),
+    *((name, "<i2") for name in ("xacc", "yacc", "zacc")),
 )
 
 MODE_FLAG_ARMED = 128

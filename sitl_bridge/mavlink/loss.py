@@ -10,8 +10,9 @@ from sitl_bridge.mavlink.links import Link
 class LossyLink:
     """Drops each datagram, sent or received, with a given chance."""
 
+    reliable = False
+
     def __init__(self, link: Link, drop_percent: float, seed: int) -> None:
-        self.reliable = link.reliable
         self._link = link
         self._chance = drop_percent / 100.0
         self._sending = random.Random(f"{seed} sending")

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.ids import vehicle_system
+from sitl_bridge.ids import ACTUATOR_CONTROLS, vehicle_system
 from sitl_bridge.mavlink.framing import (
     DATAGRAM,
     FRAME_TABLE,
@@ -28,7 +28,6 @@ from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS, MODE_FLAG_ARMED
 
 _ANSWER_ID = HIL_ACTUATOR_CONTROLS.message_id
 _PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
-CONTROLS = 16
 
 # What `read_answer` found, as bits; the system of a foreign answer comes in the next byte.
 ANSWERED, OTHERS, FOREIGN, JUNK = 1, 2, 4, 8
@@ -40,7 +39,7 @@ _FOREIGN_SHIFT = 8
     FRAME_TABLE,
     Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
     Buffer(np.uint8, (_PAYLOAD_SIZE,)),
-    Buffer(np.float64, (CONTROLS,)),
+    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
     Buffer(np.int64, (3,)),
     int,
     int,
@@ -76,7 +75,7 @@ def read_answer(
         found |= JUNK
     if found & ANSWERED:
         record = records[0]
-        for i in range(CONTROLS):
+        for i in range(ACTUATOR_CONTROLS):
             controls[i] = record.controls[i]
         header[1] = record.time_usec
         header[2] = record.mode
@@ -110,7 +109,7 @@ class AnswerReader:
         self._data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
         record, payload = HIL_ACTUATOR_CONTROLS.record()
-        self._controls = np.zeros(CONTROLS)
+        self._controls = np.zeros(ACTUATOR_CONTROLS)
         self._header = np.zeros(3, dtype=np.int64)
         self._view = self._data.data
         self._read = read_answer.bind(self._data, self._table, record, payload, self._controls, self._header)

@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple, Protocol
 
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.schema import Section, quantity
-from sitl_bridge.vehicle import Gust, Vehicle
+from sitl_bridge.vehicle import DescriptionError, Gust, Vehicle
 
 FAILURES = {"off": OFF, "stuck": STUCK, "garbage": GARBAGE, "wrong": WRONG, "lost": LOST}
 
@@ -150,6 +150,24 @@ def timeline(faults: Faults) -> list[Due]:
     for load in faults.load:
         found += _from_to(load, SetLoadMass(load.mass), SetLoadMass(None))
     return sorted(found, key=lambda due: due.time)
+
+
+def checked(faults: Faults, vehicle: Vehicle) -> Faults:
+    """The faults, if this vehicle can have them; raises DescriptionError with a line for each other."""
+    count = len(vehicle.rotors)
+    found = [
+        f"faults.rotor.{index}.rotor = {fault.rotor}: {vehicle.name} has rotors 1 to {count}"
+        for index, fault in enumerate(faults.rotor)
+        if fault.rotor > count
+    ]
+    found += [
+        f"faults.sensor.{index}.failure = 'lost': for gps only"
+        for index, fault in enumerate(faults.sensor)
+        if fault.failure == "lost" and fault.sensor != "gps"
+    ]
+    if found:
+        raise DescriptionError("faults", found)
+    return faults
 
 
 def with_gusts(vehicle: Vehicle, faults: Faults) -> Vehicle:

@@ -1,4 +1,4 @@
-"""What the plant says at each tick: HIL_GPS and truth first, HIL_SENSOR last, in one datagram.
+"""What the plant says at each tick: slow frames, HIL_GPS and truth first, HIL_SENSOR last, in one datagram.
 
 Compiled, because it runs at every tick. Frames and units are converted by `sitl_bridge.frames`.
 """
@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 from sitl_bridge.frames import (
@@ -18,6 +19,7 @@ from sitl_bridge.frames import (
     GAUSS_PER_TESLA,
     HECTOPASCALS_PER_PASCAL,
     MICROSECONDS_PER_SECOND,
+    MILLI_G_PER_METRE_PER_SECOND_SQUARED,
     MILLIMETRES_PER_METRE,
     LocalOrigin,
     attitude_to_ned_frd,
@@ -26,17 +28,20 @@ from sitl_bridge.frames import (
     rotate_inverse,
 )
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
-from sitl_bridge.mavlink.framing import Bytes, write_frame
+from sitl_bridge.mavlink.framing import Bytes, Packer, write_frame
 from sitl_bridge.mavlink.hil import (
     FRAME_BODY_FRD,
     FRAME_LOCAL_NED,
     HIL_GPS,
     HIL_SENSOR,
+    HIL_STATE_QUATERNION,
     ODOMETRY,
 )
+from sitl_bridge.plant.sensors.atmosphere import ZERO_CELSIUS
 from sitl_bridge.plant.sensors.gps import GpsFix
 from sitl_bridge.plant.sensors.instruments import MEASUREMENT
 from sitl_bridge.plant.state import STATE_SIZE, Array
+from sitl_bridge.plant.world import World
 
 DATAGRAM_SIZE = 2048  # what PX4 reads at once
 
@@ -46,14 +51,21 @@ OUTGOING = np.dtype(
         ("gps", HIL_GPS.dtype),
         ("vehicle", ODOMETRY.dtype),
         ("load", ODOMETRY.dtype),
+        ("state", HIL_STATE_QUATERNION.dtype),
     ]
 )
 _SENSOR_ID, _GPS_ID, _ODOMETRY_ID = HIL_SENSOR.message_id, HIL_GPS.message_id, ODOMETRY.message_id
 _SENSOR_SIZE, _GPS_SIZE = HIL_SENSOR.dtype.itemsize, HIL_GPS.dtype.itemsize
 _ODOMETRY_SIZE = ODOMETRY.dtype.itemsize
+_STATE_ID, _STATE_SIZE = HIL_STATE_QUATERNION.message_id, HIL_STATE_QUATERNION.dtype.itemsize
 _GPS_AT = _SENSOR_SIZE
 _VEHICLE_AT = _GPS_AT + _GPS_SIZE
 _LOAD_AT = _VEHICLE_AT + _ODOMETRY_SIZE
+_STATE_AT = _LOAD_AT + _ODOMETRY_SIZE
+# `write_tick` is told what to send besides HIL_SENSOR, as bits.
+GPS, TRUTH, STATE = 1, 2, 4
+_SEA_LEVEL_DENSITY = 1.225  # kg/m³, International Standard Atmosphere
+_GAS_CONSTANT = 287.053  # J/(kg K), dry air
 
 # Elements of the counters that `write_tick` keeps.
 VEHICLE_SEQUENCE, LOAD_SEQUENCE, VEHICLE_SYSTEM, LOAD_SYSTEM = range(4)
@@ -92,14 +104,51 @@ def fill_load_odometry(out: Any, x: Array) -> None:
     out.vx, out.vy, out.vz = enu_to_ned((x[16], x[17], x[18]))
 
 
+@kernel
+def clipped(value: float, low: int, high: int) -> int:
+    """Rounded into an integer field."""
+    return int(min(max(math.floor(value + 0.5), low), high))
+
+
+@kernel
+def fill_state(out: Any, x: Array, truth: Any, wind: Array, geodesy: Array) -> None:
+    """HIL_STATE_QUATERNION: attitude FRD to NED, position, velocity NED, specific force FRD as felt.
+
+    wind (6,): m/s at vehicle and load; geodesy (5,): latitude and longitude (deg) and altitude (m) of home,
+    degrees of longitude per metre east and of latitude per metre north.
+    """
+    q = attitude_to_ned_frd((x[6], x[7], x[8], x[9]))
+    for i in range(4):
+        out.attitude_quaternion[i] = q[i]
+    out.rollspeed, out.pitchspeed, out.yawspeed = flu_to_frd((x[10], x[11], x[12]))
+    out.lat = clipped((geodesy[0] + x[1] * geodesy[4]) * DEG_E7_PER_DEG, -0x80000000, 0x7FFFFFFF)
+    out.lon = clipped((geodesy[1] + x[0] * geodesy[3]) * DEG_E7_PER_DEG, -0x80000000, 0x7FFFFFFF)
+    out.alt = clipped((geodesy[2] + x[2]) * MILLIMETRES_PER_METRE, -0x80000000, 0x7FFFFFFF)
+    v = enu_to_ned((x[3], x[4], x[5]))
+    out.vx = clipped(v[0] * CENTIMETRES_PER_METRE, -0x8000, 0x7FFF)
+    out.vy = clipped(v[1] * CENTIMETRES_PER_METRE, -0x8000, 0x7FFF)
+    out.vz = clipped(v[2] * CENTIMETRES_PER_METRE, -0x8000, 0x7FFF)
+    through_air = math.sqrt((x[3] - wind[0]) ** 2 + (x[4] - wind[1]) ** 2 + (x[5] - wind[2]) ** 2)
+    density = truth.pressure / (_GAS_CONSTANT * (truth.temperature + ZERO_CELSIUS))
+    indicated = through_air * math.sqrt(density / _SEA_LEVEL_DENSITY)
+    out.true_airspeed = clipped(through_air * CENTIMETRES_PER_METRE, 0, 0xFFFF)
+    out.ind_airspeed = clipped(indicated * CENTIMETRES_PER_METRE, 0, 0xFFFF)
+    a = flu_to_frd((truth.accelerometer[0], truth.accelerometer[1], truth.accelerometer[2]))
+    out.xacc = clipped(a[0] * MILLI_G_PER_METRE_PER_SECOND_SQUARED, -0x8000, 0x7FFF)
+    out.yacc = clipped(a[1] * MILLI_G_PER_METRE_PER_SECOND_SQUARED, -0x8000, 0x7FFF)
+    out.zacc = clipped(a[2] * MILLI_G_PER_METRE_PER_SECOND_SQUARED, -0x8000, 0x7FFF)
+
+
 @entry_point(
     Buffer(OUTGOING, (1,)),
     Buffer(np.uint8, (OUTGOING.itemsize,)),
     Buffer(MEASUREMENT, (1,)),
+    Buffer(MEASUREMENT, (1,)),
     Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.float64, (6,)),
+    Buffer(np.float64, (5,)),
     Buffer(np.int64, (4,)),
     Buffer(np.uint8, (DATAGRAM_SIZE,)),
-    int,
     int,
     int,
 )
@@ -107,25 +156,34 @@ def write_tick(
     records: Any,
     payloads: Bytes,
     measurements: Any,
+    truth: Any,
     x: Array,
+    wind: Array,
+    geodesy: Array,
     counters: Any,
     out: Bytes,
     time_usec: int,
-    with_gps: int,
-    with_truth: int,
+    wanted: int,
 ) -> int:
     """Write the frames of one tick into `out`; returns the datagram's length.
 
-    records and payloads share their memory; the GPS record is filled by the caller.
+    records and payloads share their memory; the GPS record is filled by the caller. measurements: what the
+    sensors read, truth: what ideal ones would; wind and geodesy as for `fill_state`; wanted: bits.
     """
     messages = records[0]
     system = counters[VEHICLE_SYSTEM]
     at = 0
-    if with_gps:
+    if wanted & GPS:
         payload = payloads[_GPS_AT : _GPS_AT + _GPS_SIZE]
         at = write_frame(out, at, payload, _GPS_ID, counters[VEHICLE_SEQUENCE], system, COMPONENT_TRUTH)
         counters[VEHICLE_SEQUENCE] = (counters[VEHICLE_SEQUENCE] + 1) & 0xFF
-    if with_truth:
+    if wanted & STATE:
+        messages.state.time_usec = time_usec
+        fill_state(messages.state, x, truth[0], wind, geodesy)
+        payload = payloads[_STATE_AT : _STATE_AT + _STATE_SIZE]
+        at = write_frame(out, at, payload, _STATE_ID, counters[VEHICLE_SEQUENCE], system, COMPONENT_TRUTH)
+        counters[VEHICLE_SEQUENCE] = (counters[VEHICLE_SEQUENCE] + 1) & 0xFF
+    if wanted & TRUTH:
         messages.vehicle.time_usec = time_usec
         fill_vehicle_odometry(messages.vehicle, x)
         payload = payloads[_VEHICLE_AT : _VEHICLE_AT + _ODOMETRY_SIZE]
@@ -145,10 +203,24 @@ def write_tick(
     return at
 
 
+class CountedPacker(Packer):
+    """Packs single frames of a sender whose sequence numbers `write_tick` counts too."""
+
+    def __init__(self, system: int, component: int, counters: NDArray[np.int64], place: int) -> None:
+        super().__init__(system, component)
+        self._counters, self._place = counters, place
+
+    def next_sequence(self) -> int:
+        """The sequence number for the next frame."""
+        sequence = int(self._counters[self._place])
+        self._counters[self._place] = (sequence + 1) & 0xFF
+        return sequence
+
+
 class TickWriter:
     """Builds the datagram of each tick for one instance."""
 
-    def __init__(self, instance: int, origin: LocalOrigin, state: Array, measurement: Any) -> None:
+    def __init__(self, instance: int, origin: LocalOrigin, world: World) -> None:
         self._origin = origin
         self._records = np.zeros(1, dtype=OUTGOING)
         record = self._records[0]
@@ -162,13 +234,19 @@ class TickWriter:
         self._view = self._out.data
         counters = np.array([0, 0, vehicle_system(instance), load_system(instance)], dtype=np.int64)
         payloads = self._records.view(np.uint8)
-        self._write = write_tick.bind(self._records, payloads, measurement, state, counters, self._out)
+        geodesy = np.array([*origin.home, *origin.degrees_per_metre])
+        self._write = write_tick.bind(self._records, payloads, *world.sensed(), geodesy, counters, self._out)
+        self.vehicle = CountedPacker(vehicle_system(instance), COMPONENT_TRUTH, counters, VEHICLE_SEQUENCE)
+        """Packs other frames of the plant about the vehicle."""
+        self.load = CountedPacker(load_system(instance), COMPONENT_LOAD, counters, LOAD_SEQUENCE)
+        """Packs other frames of the load."""
 
-    def datagram(self, time_usec: int, gps: GpsFix | None, truth: bool) -> bytes:
-        """All frames of a tick: HIL_GPS when there is a fix, ODOMETRY of both when asked for, HIL_SENSOR."""
+    def datagram(self, time_usec: int, gps: GpsFix | None, wanted: int) -> bytes:
+        """The frames of a tick: HIL_GPS when there is a fix, what is wanted (TRUTH, STATE), HIL_SENSOR."""
         if gps is not None:
             self._fill_gps(time_usec, gps)
-        length = self._write(time_usec, gps is not None, truth)
+            wanted |= GPS
+        length = self._write(time_usec, wanted)
         return bytes(self._view[:length])
 
     def _fill_gps(self, time_usec: int, fix: GpsFix) -> None:

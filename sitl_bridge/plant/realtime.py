@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.plant.link import HilReceiver
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
@@ -16,7 +17,7 @@ from sitl_bridge.plant.simulation import Simulation
 AUTOPILOT_TIMEOUT = 0.3
 """Silence after which the rotors stop, s."""
 
-STOPPED = [0.0] * 16
+STOPPED = [0.0] * ACTUATOR_CONTROLS
 
 
 class Realtime:

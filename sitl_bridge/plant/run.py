@@ -13,10 +13,13 @@ import numpy as np
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.plant.faults import Faults
+from sitl_bridge.plant.faulty_link import FaultyLink
+from sitl_bridge.plant.load_to import LoadTo
 from sitl_bridge.plant.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.realtime import Realtime
-from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.state import LOAD_POSITION
 from sitl_bridge.plant.statelog import FILE_NAME, StateLog
 from sitl_bridge.process import Speaker, StopRequest
@@ -42,6 +45,9 @@ class PlantOptions:
     drop_percent: float = 0.0
     on_silence: OnSilence = "wait"
     out: Path | None = None
+    faults: Faults = NO_FAULTS
+    load_to: tuple[str, int] | None = None
+    """Ground station that is shown the load directly."""
 
 
 class Progress:
@@ -88,6 +94,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         options.instance,
         options.duration_s,
         on_begin=progress.begin,
+        faults=options.faults,
     )
     log, tlog = None, None
     if options.out is not None:
@@ -97,6 +104,8 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
     link = open_link(options.hil, speaker.say, punctual=options.clock == "realtime")
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
+    if options.faults.link:
+        link = FaultyLink(link, options.faults.link, options.seed, lambda: progress.began_at)
     notices = Notices(speaker.say)
     clock: Lockstep | Realtime
     if options.clock == "lockstep":
@@ -109,10 +118,15 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         f"{options.vehicle.name}, {options.clock} at {options.rate_hz:g} Hz, "
         f"waiting for an autopilot on {options.hil} (system {options.instance + 1})"
     )
+    station: Station | None = None
     try:
-        _loop(clock, link, tlog, progress, stop)
+        if options.load_to is not None:
+            station = Station(options.load_to, LoadTo(options.instance, simulation.origin))
+        _loop(clock, link, tlog, progress, station, stop)
     finally:
         link.close()
+        if station is not None:
+            station.close()
         if tlog is not None:
             tlog.close()
         if log is not None:
@@ -124,8 +138,31 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
     return outcome
 
 
+class Station:
+    """A ground station that is shown the load."""
+
+    def __init__(self, address: tuple[str, int], load: LoadTo) -> None:
+        self._link = open_link(Address("udpout", *address), lambda text: None)
+        self._load = load
+
+    def show(self, now: float, simulation: Simulation) -> None:
+        """Send what is due."""
+        datagram = self._load.to_send(now, simulation.time_usec, simulation.world.state)
+        if datagram is not None:
+            self._link.send(datagram)
+
+    def close(self) -> None:
+        """Free the port."""
+        self._link.close()
+
+
 def _loop(
-    clock: Lockstep | Realtime, link: Link, tlog: TlogWriter | None, progress: Progress, stop: StopRequest
+    clock: Lockstep | Realtime,
+    link: Link,
+    tlog: TlogWriter | None,
+    progress: Progress,
+    station: Station | None,
+    stop: StopRequest,
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     epoch = time.time() - time.monotonic()
@@ -143,6 +180,8 @@ def _loop(
             if tlog is not None:
                 tlog.write(received, epoch + now)
         progress.report(now, clock.simulation)
+        if station is not None:
+            station.show(now, clock.simulation)
 
 
 def _outcome(

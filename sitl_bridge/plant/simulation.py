@@ -12,11 +12,11 @@ from typing import Any, Protocol
 from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
-from sitl_bridge.ids import COMPONENT_TRUTH, vehicle_system
-from sitl_bridge.mavlink.framing import Frame, Packer, decode
-from sitl_bridge.mavlink.hil import ODOMETRY, SENSOR_RESET
+from sitl_bridge.mavlink.framing import Frame, decode
+from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
 from sitl_bridge.plant.faults import Faults, from_command, timeline, with_gusts
-from sitl_bridge.plant.messages import TickWriter
+from sitl_bridge.plant.messages import STATE, TRUTH, TickWriter
+from sitl_bridge.plant.slow_frames import LoadOnMap, SlowFrames
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
@@ -29,6 +29,26 @@ class Recorder(Protocol):
 
 
 NO_FAULTS = Faults()
+
+
+class Paced:
+    """A message that goes out at an interval, on average, as near as ticks allow."""
+
+    def __init__(self) -> None:
+        self._interval: float | None = None
+        self._due = 0.0
+
+    def every(self, interval_us: float) -> None:
+        """As SET_MESSAGE_INTERVAL has it: microseconds; 0: at every tick; negative: never."""
+        self._interval = None if interval_us < 0 else interval_us
+        self._due = 0.0
+
+    def due(self, time_usec: int) -> bool:
+        """Whether it goes out at this tick; to be asked once a tick."""
+        if self._interval is None or time_usec < self._due:
+            return False
+        self._due = max(self._due + self._interval, time_usec)
+        return True
 
 
 class Simulation:
@@ -65,9 +85,17 @@ class Simulation:
         self._truth = False
         self._heard = False
         home = vehicle.home
-        self._origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
-        self._writer = TickWriter(instance, self._origin, self.world.state, self.world.measurement)
-        self._replies = Packer(vehicle_system(instance), COMPONENT_TRUTH)
+        self.origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
+        self._writer = TickWriter(instance, self.origin, self.world)
+        self._slow = SlowFrames(
+            LoadOnMap(instance, self.origin),
+            self._writer.load,
+            self._writer.vehicle,
+            vehicle.battery,
+            rate_hz,
+        )
+        self._power = self.world.battery(0.0)
+        self._state = Paced()
         self._under_way: deque[Sequence[float]] = deque()
         self._datagram: bytes | None = None
 
@@ -92,10 +120,16 @@ class Simulation:
             fresh = self._sensors_due and self.tick >= self._first_sensed
             if fresh:
                 self._begin_sensing()
-            fix = self.world.measure(self.tick - self._first_sensed, not self.started)
+            tick, time_usec, world = self.tick - self._first_sensed, self.time_usec, self.world
+            fix = world.measure(tick, not self.started)
             if fresh:
-                self.world.measurement["updated"] |= SENSOR_RESET
-            self._datagram = self._writer.datagram(self.time_usec, fix, self._truth and self._heard)
+                world.measurement["updated"] |= SENSOR_RESET
+            seen = None if world.tracker is None else world.tracker.sample(tick, world.state)
+            slow = self._slow.frames(tick, time_usec, world.state, self._power, seen)
+            wanted = TRUTH if self._truth and self._heard else 0
+            if self._state.due(time_usec):
+                wanted |= STATE
+            self._datagram = slow + self._writer.datagram(time_usec, fix, wanted)
         return self._datagram
 
     def heard(self) -> None:
@@ -132,6 +166,7 @@ class Simulation:
         for _ in range(self._vehicle.loop.delay_ticks):
             self._under_way.append(self.world.trim_controls)
         self._faults_done = 0
+        self._power = self.world.battery(0.0)
         self._apply_faults()
         self._on_begin()
 
@@ -158,6 +193,7 @@ class Simulation:
     def finish_tick(self) -> None:
         """The tick is over: the next one is the current one; the scenario's last is recorded too."""
         self.ticks_flown += 1
+        self._power = self.world.battery(self.period)
         self._apply_faults()
         self.next_tick()
         if self.finished:
@@ -175,9 +211,8 @@ class Simulation:
     def handle(self, frame: Frame) -> bytes | None:
         """Answer anything else that the autopilot says; the reply, if one is due.
 
-        SET_MESSAGE_INTERVAL for ODOMETRY asks for truth, INJECT_FAILURE lets something fail. Everything else
-        that a real autopilot sends a simulator on connecting (HEARTBEAT, an interval for
-        HIL_STATE_QUATERNION) needs no reaction.
+        SET_MESSAGE_INTERVAL for ODOMETRY asks for truth at every tick, for HIL_STATE_QUATERNION for that at
+        its interval; INJECT_FAILURE lets something fail. A HEARTBEAT needs no reaction.
         """
         if frame.message_id != common.MAVLINK_MSG_ID_COMMAND_LONG:
             return None
@@ -190,6 +225,11 @@ class Simulation:
             result = common.MAV_RESULT_UNSUPPORTED if actions is None else result
         elif command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL and command.param1 == ODOMETRY.message_id:
             self.ask_for_truth(command.param2 >= 0)
+        elif (
+            command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL
+            and command.param1 == HIL_STATE_QUATERNION.message_id
+        ):
+            self._state.every(command.param2)
         else:
             return None
         acknowledgement: Any = common.MAVLink_command_ack_message(
@@ -200,4 +240,4 @@ class Simulation:
             target_system=frame.system,
             target_component=frame.component,
         )
-        return self._replies.pack(acknowledgement)
+        return self._writer.vehicle.pack(acknowledgement)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.frames import quaternion_from_euler, rotate
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ COLUMNS = (
 )
 """Log column of each element of the state, in order."""
 
-MOST_ROTORS = 16  # as many as HIL_ACTUATOR_CONTROLS has controls
+MOST_ROTORS = ACTUATOR_CONTROLS
 MOST_LEGS = 8
 LOAD_CONTACT = MOST_LEGS  # number of the load's contact, after those of the legs
 

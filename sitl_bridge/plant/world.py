@@ -160,6 +160,10 @@ class World:
         """Parameter record, state, inner state, commands and force as they change, for a log to read."""
         return self._record, self.state, self.inner, self.rotor_speed, self._force.now
 
+    def sensed(self) -> tuple[NDArray[Any], NDArray[Any], Array, Array]:
+        """Readings and truth of the sensors, state, and wind at vehicle and load, as they change."""
+        return self.measurement, self._truth, self.state, self._wind.now
+
     def measure(self, tick: int, held: bool) -> GpsFix | None:
         """Fill `measurement` from the world as it is at a tick, to be called once for each in turn.
 

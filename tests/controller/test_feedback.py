@@ -97,6 +97,25 @@ def test_readings_are_in_si_units_and_the_autopilots_frames() -> None:
     assert float(sensed["altitude"]) == pytest.approx(float(measured["pressure_altitude"]), abs=1e-4)
 
 
+def test_a_tracker_sharpens_the_load() -> None:
+    sharp = load_vehicle(
+        "paper",
+        [
+            "disturbance.force_std=5",
+            "sensors.preset=consumer",
+            "sensors.tracker.angle_noise=0.005",
+            "sensors.tracker.distance_noise=0.01",
+            "sensors.tracker.delay=0.05",
+        ],
+    )
+    flight = Flight(sharp, Faults(), 4.0)
+    flight.fly()
+    tracker = flight.feedback.estimator.health().sensors["tracker"]
+    assert tracker.age < 0.1
+    assert tracker.rejected == 0
+    assert tracker.nis == pytest.approx(1.0, abs=0.4)
+
+
 def test_it_flies_where_it_is_told(vehicle: Vehicle) -> None:
     flight = Flight(vehicle, Faults(), 15.0)
     flight.fly()

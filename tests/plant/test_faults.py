@@ -17,6 +17,7 @@ from sitl_bridge.plant.faults import (
     SetLoadMass,
     SetRotor,
     SetSensor,
+    checked,
     from_command,
     timeline,
 )
@@ -213,3 +214,16 @@ def test_failures_are_injected_over_mavlink(unit: int, result: int, stopped: int
     assert decode(answer).result == result
     simulation.step(simulation.world.trim_controls)
     assert np.count_nonzero(simulation.world.rotor_speed[:4] == 0.0) == stopped
+
+
+def test_a_fault_that_the_vehicle_cannot_have_is_refused() -> None:
+    table = {
+        "rotor": [{"rotor": 5, "at": 1.0}],
+        "sensor": [{"sensor": "barometer", "failure": "lost", "at": 1.0}],
+    }
+    with pytest.raises(DescriptionError) as refused:
+        checked(validated(Faults, table, "test"), load_vehicle("iris"))
+    assert refused.value.faults == [
+        "faults.rotor.0.rotor = 5: iris has rotors 1 to 4",
+        "faults.sensor.0.failure = 'lost': for gps only",
+    ]

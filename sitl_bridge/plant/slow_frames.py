@@ -1,0 +1,203 @@
+"""What the plant says now and then, in front of a tick's HIL_SENSOR: the load, its tracker, the battery.
+
+The load is a MAVLink system of its own, after ArduPilot's simulated slung payload: HEARTBEAT of type AIRSHIP
+and GLOBAL_POSITION_INT. Ground stations that draw only aircraft with an autopilot get it as ADSB_VEHICLE too.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import common
+
+from sitl_bridge.frames import (
+    CENTIDEGREES_PER_RADIAN,
+    CENTIMETRES_PER_METRE,
+    DEG_E7_PER_DEG,
+    MICROSECONDS_PER_SECOND,
+    MILLIMETRES_PER_METRE,
+    LocalOrigin,
+    Triple,
+    enu_to_ned,
+    flu_to_frd,
+)
+from sitl_bridge.ids import load_system
+from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
+from sitl_bridge.plant.battery import BatteryReading
+from sitl_bridge.plant.sensors.tracker import Sighting
+from sitl_bridge.plant.state import LOAD_POSITION, LOAD_VELOCITY, Array
+from sitl_bridge.vehicle import Battery
+
+HEARTBEAT_INTERVAL = 1.0
+POSITION_INTERVAL = 0.2
+BATTERY_INTERVAL = 0.5
+MILLIVOLTS_PER_VOLT = 1e3
+CENTIAMPERES_PER_AMPERE = 1e2
+MILLIAMPERE_HOURS_PER_AMPERE_HOUR = 1e3
+NOT_KNOWN_UINT16 = 0xFFFF
+NOT_KNOWN_INT16 = 0x7FFF
+
+
+def within(value: float, low: int, high: int) -> int:
+    """Rounded into an integer field."""
+    return max(low, min(high, round(value)))
+
+
+def load_heartbeat() -> Any:
+    """HEARTBEAT of a body without autopilot, modes and arming."""
+    return common.MAVLink_heartbeat_message(
+        type=common.MAV_TYPE_AIRSHIP,
+        autopilot=common.MAV_AUTOPILOT_INVALID,
+        base_mode=0,
+        custom_mode=0,
+        system_status=common.MAV_STATE_ACTIVE,
+        mavlink_version=3,
+    )
+
+
+class LoadOnMap:
+    """Where the load is, as messages for maps; state x (19,), world ENU, m and m/s."""
+
+    def __init__(self, instance: int, origin: LocalOrigin) -> None:
+        self._instance = instance
+        self._origin = origin
+
+    def _position(self, x: Array) -> tuple[int, int, int, int]:
+        east, north, up = x[LOAD_POSITION].tolist()
+        point = self._origin.geodetic((east, north, up))
+        return (
+            round(point.latitude * DEG_E7_PER_DEG),
+            round(point.longitude * DEG_E7_PER_DEG),
+            round(point.altitude * MILLIMETRES_PER_METRE),
+            round(up * MILLIMETRES_PER_METRE),
+        )
+
+    def _velocity(self, x: Array) -> Triple:
+        """North, east, down, cm/s."""
+        v_east, v_north, v_up = x[LOAD_VELOCITY].tolist()
+        north, east, down = enu_to_ned((v_east, v_north, v_up))
+        return (
+            CENTIMETRES_PER_METRE * north,
+            CENTIMETRES_PER_METRE * east,
+            CENTIMETRES_PER_METRE * down,
+        )
+
+    def global_position(self, time_usec: int, x: Array) -> Any:
+        """GLOBAL_POSITION_INT; a point has no heading."""
+        latitude, longitude, altitude, above_home = self._position(x)
+        north, east, down = (within(v, -0x8000, 0x7FFF) for v in self._velocity(x))
+        return common.MAVLink_global_position_int_message(
+            time_boot_ms=(time_usec // 1000) & 0xFFFFFFFF,
+            lat=latitude,
+            lon=longitude,
+            alt=altitude,
+            relative_alt=above_home,
+            vx=north,
+            vy=east,
+            vz=down,
+            hdg=NOT_KNOWN_UINT16,
+        )
+
+    def traffic(self, x: Array) -> Any:
+        """ADSB_VEHICLE."""
+        latitude, longitude, altitude, _ = self._position(x)
+        north, east, down = self._velocity(x)
+        flags = (
+            common.ADSB_FLAGS_VALID_COORDS
+            | common.ADSB_FLAGS_VALID_ALTITUDE
+            | common.ADSB_FLAGS_VALID_HEADING
+            | common.ADSB_FLAGS_VALID_VELOCITY
+            | common.ADSB_FLAGS_VALID_CALLSIGN
+            | common.ADSB_FLAGS_SIMULATED
+        )
+        course = math.atan2(east, north) % (2.0 * math.pi)
+        return common.MAVLink_adsb_vehicle_message(
+            ICAO_address=load_system(self._instance),
+            lat=latitude,
+            lon=longitude,
+            altitude_type=common.ADSB_ALTITUDE_TYPE_GEOMETRIC,
+            altitude=altitude,
+            heading=round(course * CENTIDEGREES_PER_RADIAN) % 36000,
+            hor_velocity=within(math.hypot(north, east), 0, 0xFFFF),
+            ver_velocity=within(-down, -0x8000, 0x7FFF),
+            callsign=f"LOAD{self._instance}".encode(),
+            emitter_type=common.ADSB_EMITTER_TYPE_LIGHTER_AIR,
+            tslc=0,
+            flags=flags,
+            squawk=0,
+        )
+
+
+def battery_status(battery: Battery, now: BatteryReading) -> Any:
+    """BATTERY_STATUS; the pack's voltage stands in the first cell, for its cells are not measured."""
+    used = (1.0 - now.remaining) * battery.capacity
+    rest = [NOT_KNOWN_UINT16] * 9
+    return common.MAVLink_battery_status_message(
+        id=0,
+        battery_function=common.MAV_BATTERY_FUNCTION_ALL,
+        type=common.MAV_BATTERY_TYPE_LIPO,
+        temperature=NOT_KNOWN_INT16,
+        voltages=[within(now.voltage * MILLIVOLTS_PER_VOLT, 0, NOT_KNOWN_UINT16 - 1), *rest],
+        current_battery=within(now.current * CENTIAMPERES_PER_AMPERE, 0, 0x7FFF),
+        current_consumed=round(used * MILLIAMPERE_HOURS_PER_AMPERE_HOUR),
+        energy_consumed=-1,
+        battery_remaining=round(100.0 * now.remaining),
+    )
+
+
+def landing_target(time_usec: int, seen: Sighting) -> Any:
+    """LANDING_TARGET of the tracker: where the load is from the vehicle, m, BODY_FRD, at its exposure.
+
+    Angles are those of the image of a camera that looks down with its upper edge ahead: positive to the right
+    and to the rear.
+    """
+    x, y, z = flu_to_frd(seen.position)
+    return common.MAVLink_landing_target_message(
+        time_usec=max(0, time_usec - round(seen.age * MICROSECONDS_PER_SECOND)),
+        target_num=0,
+        frame=FRAME_BODY_FRD,
+        angle_x=math.atan2(y, z),
+        angle_y=math.atan2(-x, z),
+        distance=math.sqrt(x * x + y * y + z * z),
+        size_x=0.0,
+        size_y=0.0,
+        x=x,
+        y=y,
+        z=z,
+        q=(1.0, 0.0, 0.0, 0.0),
+        type=common.LANDING_TARGET_TYPE_VISION_OTHER,
+        position_valid=1,
+    )
+
+
+class SlowFrames:
+    """Decides what is due at a tick; each tick is asked for once, in turn."""
+
+    def __init__(
+        self, load_map: LoadOnMap, load: Packer, vehicle: Packer, battery: Battery | None, rate_hz: float
+    ) -> None:
+        """load, vehicle: pack frames of the load's and the vehicle's system."""
+        self._map = load_map
+        self._load, self._vehicle = load, vehicle
+        self._battery = battery
+        self._heartbeat_every, self._position_every, self._battery_every = (
+            max(1, round(interval * rate_hz))
+            for interval in (HEARTBEAT_INTERVAL, POSITION_INTERVAL, BATTERY_INTERVAL)
+        )
+
+    def frames(
+        self, tick: int, time_usec: int, x: Array, power: BatteryReading | None, seen: Sighting | None
+    ) -> bytes:
+        """All that is due, one behind the other."""
+        out = b""
+        if tick % self._heartbeat_every == 0:
+            out += self._load.pack(load_heartbeat())
+        if tick % self._position_every == 0:
+            out += self._load.pack(self._map.global_position(time_usec, x))
+        if power is not None and self._battery is not None and tick % self._battery_every == 0:
+            out += self._vehicle.pack(battery_status(self._battery, power))
+        if seen is not None:
+            out += self._vehicle.pack(landing_target(time_usec, seen))
+        return out
