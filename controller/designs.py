@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from controller.estimator.weights import estimated_weights
 from controller.flatness import body
 from controller.law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
 from controller.lqr import Weights, sampled_gain, sampled_model
@@ -26,6 +27,8 @@ from controller.state import (
 from sitl_bridge.vehicle import Vehicle
 
 DESIGNS = ("default", "paper", "paper-lqr")
+ON_ESTIMATE = "default-on-estimate"
+"""What `default` is for feedback from the estimator."""
 
 ANTI_WINDUP_TIME = 1.0
 """Time constant, s, with which the integral gives way while the rotors are at a limit."""
@@ -95,6 +98,8 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     """
     if name == "default":
         return design_for(vehicle, rate_hz, default_weights(vehicle), FEEDFORWARD)
+    if name == ON_ESTIMATE:
+        return design_for(vehicle, rate_hz, estimated_weights(vehicle), FEEDFORWARD)
     if name == "paper":
         return design_for(vehicle, rate_hz, paper_weights(), INTEGRATOR)
     if name == "paper-lqr":

@@ -5,9 +5,11 @@ from __future__ import annotations
 import gc
 import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from controller.autopilot import Autopilot, PathFrom
+from controller.designs import ON_ESTIMATE
 from controller.hil.session import HilSession, new_session
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
@@ -15,6 +17,8 @@ from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from controller.estimate_log import EstimateLog
+    from controller.feedback import Feedback
     from controller.ground_link import GroundOptions
     from controller.guided_run import Guided
 
@@ -35,6 +39,9 @@ class ControllerOptions:
     seed: int = 0
     ground: GroundOptions | None = None
     """With `path_from` None: how ground control reaches the vehicle."""
+    feedback: str = "truth"
+    out: Path | None = None
+    """Where the estimate's log goes."""
 
 
 def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
@@ -45,21 +52,28 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
+    log: EstimateLog | None = None
+    feedback: Feedback | None = None
+    design = options.design
+    if options.feedback == "estimate":
+        log, feedback = _estimating(options)
+        design = ON_ESTIMATE if design == "default" else design
     guided: Guided | None = None
     if options.path_from is None:
         from controller.guided_run import Guided
 
         guided = Guided(options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say)
-        session = new_session(guided.autopilot, options.instance, speaker.say)
+        session = new_session(guided.autopilot, options.instance, speaker.say, feedback)
     else:
         path_from = options.path_from
         session = new_session(
-            lambda controls: Autopilot(options.vehicle, options.design, options.rate_hz, path_from, controls),
+            lambda controls: Autopilot(options.vehicle, design, options.rate_hz, path_from, controls),
             options.instance,
             speaker.say,
+            feedback,
         )
     speaker.say(
-        f"{options.vehicle.name}, {options.design} design at {options.rate_hz:g} Hz, "
+        f"{options.vehicle.name}, {options.design} design on {options.feedback} at {options.rate_hz:g} Hz, "
         f"waiting for a plant on {options.hil} (system {options.instance + 1})"
     )
     most_steps = None if options.duration_s is None else round(options.duration_s * options.rate_hz)
@@ -69,11 +83,22 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         if guided is not None:
             guided.close()
         link.close()
+        if log is not None:
+            log.close()
     if stop:
         speaker.say(f"stopped by {stop.reason}")
     outcome = {"stopped_by": stop.reason, "control_steps": session.steps}
     speaker.event("end", **outcome)
     return outcome
+
+
+def _estimating(options: ControllerOptions) -> tuple[EstimateLog | None, Feedback]:
+    """The estimator and its log; imported only where they are flown on."""
+    from controller.estimate_feedback import EstimateFeedback
+    from controller.estimate_log import EstimateLog
+
+    log = None if options.out is None else EstimateLog(options.out)
+    return log, EstimateFeedback(options.vehicle, options.rate_hz, log)
 
 
 def _loop(

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ FULL = (
     "air.turbulence.wind_at_6_m=7.7",
 )
 """What makes `iris`, which has ground, rotor lag, drag and a battery, a plant with everything on."""
+ON_ESTIMATE = ("--feedback", "estimate")
 
 
 def free_udp_port() -> int:
@@ -80,23 +82,25 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     return len(simulation.datagram()), len(writer.answer(4000, True))
 
 
-def lockstep_flight(scenario: str, *more: str) -> dict[str, Any]:
+def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ()) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     port = free_udp_port()
-    common = ["--scenario", scenario, "--rate", str(RATE_HZ), *more]
+    sensors = ["--set", "sensors.preset=consumer"] if feedback else []
+    common = ["--scenario", scenario, "--rate", str(RATE_HZ), *sensors, *more]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
-    controller = [*common, "--hil", f"udpin:127.0.0.1:{port}"]
+    controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
     if outcome.failure:
         raise RuntimeError(outcome.failure)
     return outcome.end
 
 
-def launch_to_first_command_s() -> float:
+def launch_to_first_command_s(feedback: Sequence[str] = ()) -> float:
     """Time from the launch of `sitl fly` to the first rotor command at the plant, s."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "sitl", "fly", "hover", "--duration", "0.1", "--out", folder]
         command += ["--hil", f"udpout:127.0.0.1:{free_udp_port()}"]
+        command += feedback
         launched = time.time()
         subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
         summary = json.loads((Path(folder) / "summary.json").read_text())
@@ -127,6 +131,13 @@ def bench(repeats: int) -> dict[str, float]:
         measured["physics_step_full_ratio"] = measured["physics_step_us_full"] / measured["physics_step_us"]
         measured["lockstep_tick_full_ratio"] = (
             measured["lockstep_tick_us_full"] / measured["lockstep_tick_us"]
+        )
+        estimated = lockstep_flight("setpoint", feedback=ON_ESTIMATE)["real_time_factor"]
+        measured["lockstep_tick_us_estimate"] = 1e6 / (estimated * RATE_HZ)
+        measured["real_time_factor_estimate"] = estimated
+        measured["launch_to_first_command_s_estimate"] = launch_to_first_command_s(ON_ESTIMATE)
+        measured["lockstep_tick_estimate_ratio"] = (
+            measured["lockstep_tick_us_estimate"] / measured["lockstep_tick_us"]
         )
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():

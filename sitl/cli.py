@@ -131,6 +131,7 @@ def build_parser() -> argparse.ArgumentParser:
     controller.add_argument(
         "--json", action="store_true", help="one JSON object on standard output at the end"
     )
+    controller.add_argument("--out", metavar="DIR", type=Path, help="where to write the estimate's log")
     controller.set_defaults(run=_controller)
 
     bench = commands.add_parser(
@@ -265,7 +266,10 @@ def _control(parser: argparse.ArgumentParser) -> None:
         help="gain design: re-weighted for margins, the paper's integral LQR, or its LQR without integrator",
     )
     parser.add_argument(
-        "--feedback", choices=("truth",), default="truth", help="what the law flies on (default: truth)"
+        "--feedback",
+        choices=("truth", "estimate"),
+        default="truth",
+        help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth)",
     )
 
 
@@ -431,6 +435,8 @@ def _controller(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         seed=arguments.seed,
         ground=_ground_options(arguments),
+        feedback=arguments.feedback,
+        out=arguments.out,
     )
     outcome = run(options, speaker, stop)
     if arguments.json:

@@ -63,6 +63,8 @@ class FlightOptions:
             plant += ["--out", str(self.out)]
         other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
         controller = [*common, "--hil", str(other_end), "--design", self.design, "--feedback", self.feedback]
+        if self.out is not None:
+            controller += ["--out", str(self.out)]
         return plant, [*controller, *self.ground]
 
 
@@ -116,4 +118,4 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
     path = path_from(start)
-    return write_report(options.out, facts, path)
+    return write_report(options.out, facts, path, vehicle if options.feedback == "estimate" else None)

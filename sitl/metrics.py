@@ -53,6 +53,12 @@ def overshoot_pct(load: Array, start: Array, target: Array) -> float | None:
     return worst
 
 
+def steady(times: Array) -> NDArray[np.bool_]:
+    """Which of the times (n,), s, belong to the steady part of a flight."""
+    end = float(times[-1])
+    return np.asarray(times >= (STEADY_FROM if end > STEADY_FROM else end * 2.0 / 3.0))
+
+
 def flight_metrics(times: Array, load: Array, reference: Array) -> dict[str, Any]:
     """Metrics of a flight: times (n,) in s, load (n, 3) and reference (n, 3) in m, world.
 
@@ -64,13 +70,12 @@ def flight_metrics(times: Array, load: Array, reference: Array) -> dict[str, Any
     is_step = step > SETTLED_DISTANCE
     tolerance = SETTLED_SHARE * step if is_step else HOLDING_DISTANCE
     end = float(times[-1])
-    steady = times >= (STEADY_FROM if end > STEADY_FROM else end * 2.0 / 3.0)
     last = times >= end - SETTLED_WINDOW
     return {
         "settled": bool(end >= SETTLED_WINDOW and np.all(errors[last] <= tolerance)),
         "settling_time_2pct_s": settling_time(times, errors, SETTLED_SHARE * step) if is_step else None,
         "settling_time_1cm_s": settling_time(times, errors, SETTLED_DISTANCE) if stands_still else None,
         "overshoot_pct": overshoot_pct(load, load[0], reference[0]) if stands_still else None,
-        "steady_state_error_m": float(errors[steady].max()),
-        "tracking_rms_m": float(np.sqrt(np.mean(errors[steady] ** 2))),
+        "steady_state_error_m": float(errors[steady(times)].max()),
+        "tracking_rms_m": float(np.sqrt(np.mean(errors[steady(times)] ** 2))),
     }

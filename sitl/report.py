@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.estimate_log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.reference import Path as ReferencePath
 from sitl.metrics import flight_metrics, reference_positions
 from sitl_bridge.plant.statelog import FILE_NAME
+from sitl_bridge.vehicle import Vehicle
 
 SUMMARY_NAME = "summary.json"
 PICTURE_NAME = "flight.png"
@@ -37,10 +39,13 @@ def positions(log: Log, body: str) -> NDArray[np.float64]:
     return np.stack([log[f"{body}_{axis}_m"] for axis in "xyz"], axis=1)
 
 
-def write_report(out: Path, facts: dict[str, Any], path: ReferencePath | None) -> dict[str, Any]:
+def write_report(
+    out: Path, facts: dict[str, Any], path: ReferencePath | None, vehicle: Vehicle | None = None
+) -> dict[str, Any]:
     """Write summary.json and the picture next to the state log; returns the summary.
 
-    facts: what is known besides the log; path: the reference, None when nothing has flown.
+    facts: what is known besides the log; path: the reference, None when nothing has flown; vehicle: as the
+    controller was told, where it has left a log of its estimate.
     """
     state_log = out / FILE_NAME
     summary = {**facts, "settled": False}
@@ -54,6 +59,8 @@ def write_report(out: Path, facts: dict[str, Any], path: ReferencePath | None) -
             reference = reference_positions(path, log["time_s"])
             metrics = flight_metrics(log["time_s"], positions(log, "load"), reference)
             summary |= metrics
+            if vehicle is not None and (out / ESTIMATE_NAME).exists():
+                summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
             draw(out / PICTURE_NAME, log, reference, facts)
             summary["picture"] = str(out / PICTURE_NAME)
         summary["state_log"] = str(state_log)
@@ -61,6 +68,27 @@ def write_report(out: Path, facts: dict[str, Any], path: ReferencePath | None) -
     summary["settled"] = bool(summary["settled"] and facts.get("completed"))
     (out / SUMMARY_NAME).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     return summary
+
+
+def estimate_report(
+    out: Path, log: Log, reference: NDArray[np.float64], vehicle: Vehicle, rate_hz: float
+) -> dict[str, Any] | None:
+    """`estimate` of the summary, with the bound of the linear filter; None when its log is not complete."""
+    from controller.estimate_feedback import tuning_for
+    from controller.estimator.bound import load_relative_bound
+    from sitl.estimate_metrics import estimate_metrics
+
+    try:
+        estimates, covariances = (read_state_log(out / name) for name in (ESTIMATE_NAME, COVARIANCE_NAME))
+    except (OSError, ValueError):
+        return None
+    bound = load_relative_bound(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
+    return {
+        **estimate_metrics(log, estimates, covariances, reference),
+        "load_relative_bound_m": bound.tolist(),
+        "estimate_log": str(out / ESTIMATE_NAME),
+        "covariance_log": str(out / COVARIANCE_NAME),
+    }
 
 
 def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, Any]) -> None:

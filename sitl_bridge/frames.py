@@ -8,7 +8,7 @@ body vectors into the world.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sitl_bridge.compiled import kernel
 
@@ -155,3 +155,14 @@ class LocalOrigin:
             (point.latitude - self.home.latitude) / self._degrees_per_metre_north,
             point.altitude - self.home.altitude,
         )
+
+
+def fix_from_wire(gps: Any, origin: LocalOrigin) -> tuple[Triple, Triple]:
+    """Position (m) and velocity (m/s), ENU from home, of a HIL_GPS record."""
+    point = Geodetic(
+        int(gps["lat"]) / DEG_E7_PER_DEG,
+        int(gps["lon"]) / DEG_E7_PER_DEG,
+        int(gps["alt"]) / MILLIMETRES_PER_METRE,
+    )
+    north, east, down = (int(gps[name]) / CENTIMETRES_PER_METRE for name in ("vn", "ve", "vd"))
+    return origin.local(point), enu_to_ned((north, east, down))

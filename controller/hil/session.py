@@ -11,8 +11,9 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import common
 
+from controller.feedback import Feedback, TruthFeedback
 from controller.hil.answers import AnswerWriter
-from controller.hil.ticks import TickReader
+from controller.hil.ticks import Tick, TickReader
 from controller.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
@@ -53,6 +54,7 @@ class HilSession:
         packer: Packer,
         instance: int,
         say: Callable[[str], None],
+        feedback: Feedback,
     ) -> None:
         self.steps = 0
         """Control steps made."""
@@ -61,6 +63,7 @@ class HilSession:
         self._packer = packer
         self._say = say
         self._reader = TickReader(instance)
+        self._feedback = feedback
         self._instance = instance
         self._out: list[bytes] = []
         self._last_time = 0
@@ -97,21 +100,26 @@ class HilSession:
             if tick.time_usec <= self._last_time:
                 self._say("the plant has started again")
                 self._autopilot.disarm()
-            self._answer(tick.time_usec, tick.truth, now)
+                self._feedback.restart()
+            self._answer(tick.time_usec, tick, now)
         else:
             return  # overtaken by a newer tick
         self._last_heard = now
 
-    def _answer(self, time_usec: int, truth: bool, now: float) -> None:
-        if truth:
+    def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
+        estimate = self._feedback.take(time_usec, tick, self._reader)
+        if estimate is not None:
             before = self._autopilot.armed
-            self._autopilot.step(self._reader.estimate, time_usec, now)
+            self._autopilot.step(estimate, time_usec, now)
             if self._autopilot.armed != before:
-                self._say("disarmed" if before else "plant and truth are there: armed, flying")
+                self._say(
+                    "disarmed" if before else f"plant and {self._feedback.name} are there: armed, flying"
+                )
+            self._feedback.flown(self._writer.controls)
             self.steps += 1
         else:
             self._autopilot.disarm()
-            if now >= self._next_request:
+            if self._feedback.needs_truth and now >= self._next_request:
                 self._next_request = now + REQUEST_INTERVAL
                 self._request(ODOMETRY.message_id, 0.0)
         self._last_time = time_usec
@@ -151,9 +159,14 @@ class HilSession:
 
 
 def new_session(
-    make_autopilot: Callable[[Array], Pilot], instance: int, say: Callable[[str], None]
+    make_autopilot: Callable[[Array], Pilot],
+    instance: int,
+    say: Callable[[str], None],
+    feedback: Feedback | None = None,
 ) -> HilSession:
     """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,)."""
     packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
     writer = AnswerWriter(instance, packer)
-    return HilSession(make_autopilot(writer.controls), writer, packer, instance, say)
+    return HilSession(
+        make_autopilot(writer.controls), writer, packer, instance, say, feedback or TruthFeedback()
+    )

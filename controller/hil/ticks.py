@@ -1,4 +1,4 @@
-"""What the plant says in a tick: time, and truth where it was asked for; compiled."""
+"""What the plant says in a tick: time, sensors, and truth where it was asked for; compiled."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ import numpy as np
 
 from controller.state import STATE_SIZE, Array
 from sitl_bridge.compiled import Buffer, entry_point, kernel
-from sitl_bridge.frames import attitude_to_enu_flu, enu_to_ned, euler_from_quaternion, flu_to_frd, rotate
+from sitl_bridge.frames import (
+    GAUSS_PER_TESLA,
+    attitude_to_enu_flu,
+    enu_to_ned,
+    euler_from_quaternion,
+    flu_to_frd,
+    rotate,
+)
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
 from sitl_bridge.mavlink.framing import (
     COMPONENT,
@@ -26,15 +33,38 @@ from sitl_bridge.mavlink.framing import (
     read_payload,
     scan,
 )
-from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, ODOMETRY
+from sitl_bridge.mavlink.hil import HIL_GPS, HIL_SENSOR, HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
 
-INCOMING = np.dtype([("sensor", HIL_SENSOR.dtype), ("vehicle", ODOMETRY.dtype), ("load", ODOMETRY.dtype)])
+INCOMING = np.dtype(
+    [
+        ("sensor", HIL_SENSOR.dtype),
+        ("vehicle", ODOMETRY.dtype),
+        ("load", ODOMETRY.dtype),
+        ("gps", HIL_GPS.dtype),
+    ]
+)
+SENSED = np.dtype(
+    [
+        ("accelerometer", "f8", 3),  # specific force, m/s², body FLU
+        ("gyroscope", "f8", 3),  # rad/s, body FLU
+        ("magnetometer", "f8", 3),  # T, body FLU
+        ("altitude", "f8"),  # m above mean sea level, from the pressure
+        ("has_imu", "b1"),  # new in this tick, likewise the others
+        ("has_magnetometer", "b1"),
+        ("has_altitude", "b1"),
+        ("has_begun", "b1"),  # the plant's sensors have begun afresh with this tick
+    ]
+)
+"""HIL_SENSOR in SI units and the autopilot's frames."""
+_IMU_BITS, _MAGNETOMETER_BITS, _ALTITUDE_BIT = 0x3F, 0x1C0, 0x800
+"""Of HIL_SENSOR.fields_updated."""
 _SENSOR_ID, _GPS_ID, _ODOMETRY_ID = HIL_SENSOR.message_id, HIL_GPS.message_id, ODOMETRY.message_id
 _STATE_ID = HIL_STATE_QUATERNION.message_id
 _SENSOR_SIZE, _ODOMETRY_SIZE = HIL_SENSOR.dtype.itemsize, ODOMETRY.dtype.itemsize
+_LOAD_AT, _GPS_AT = _SENSOR_SIZE + _ODOMETRY_SIZE, _SENSOR_SIZE + 2 * _ODOMETRY_SIZE
 
 # What `read_tick` found, as bits.
-TICK, VEHICLE_TRUTH, LOAD_TRUTH, OTHERS = 1, 2, 4, 8
+TICK, VEHICLE_TRUTH, LOAD_TRUTH, OTHERS, GPS = 1, 2, 4, 8, 16
 
 
 @kernel
@@ -53,12 +83,31 @@ def estimate_from_truth(vehicle: Any, load: Any, estimate: Array) -> None:
     estimate[15], estimate[16], estimate[17] = euler_from_quaternion(attitude)
 
 
+@kernel
+def read_sensors(sensor: Any, out: Any) -> None:
+    """SENSED from HIL_SENSOR."""
+    a = flu_to_frd((sensor.xacc, sensor.yacc, sensor.zacc))
+    g = flu_to_frd((sensor.xgyro, sensor.ygyro, sensor.zgyro))
+    m = flu_to_frd((sensor.xmag, sensor.ymag, sensor.zmag))
+    for i in range(3):
+        out.accelerometer[i] = a[i]
+        out.gyroscope[i] = g[i]
+        out.magnetometer[i] = m[i] / GAUSS_PER_TESLA
+    out.altitude = sensor.pressure_alt
+    bits = int(sensor.fields_updated)
+    out.has_imu = bits & _IMU_BITS == _IMU_BITS
+    out.has_magnetometer = bits & _MAGNETOMETER_BITS == _MAGNETOMETER_BITS
+    out.has_altitude = bits & _ALTITUDE_BIT != 0
+    out.has_begun = bits & SENSOR_RESET != 0
+
+
 @entry_point(
     DATAGRAM,
     FRAME_TABLE,
     Buffer(INCOMING, (1,)),
     Buffer(np.uint8, (INCOMING.itemsize,)),
     Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(SENSED, (1,)),
     Buffer(np.int64, (2,)),
     int,
     int,
@@ -70,6 +119,7 @@ def read_tick(
     records: Any,
     payloads: Bytes,
     estimate: Array,
+    sensed: Any,
     header: Any,
     length: int,
     vehicle_sys: int,
@@ -78,7 +128,7 @@ def read_tick(
     """Read data[:length]; returns bits of what was found.
 
     header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written;
-    truth that is not finite is none.
+    truth that is not finite is none. sensed: of the last HIL_SENSOR.
     """
     count = scan(data, table, length)
     header[0] = count
@@ -90,15 +140,19 @@ def read_tick(
             read_payload(data, table[i], payloads[:_SENSOR_SIZE])
             found |= TICK
         elif message_id == _ODOMETRY_ID and system == vehicle_sys and component == COMPONENT_TRUTH:
-            read_payload(data, table[i], payloads[_SENSOR_SIZE : _SENSOR_SIZE + _ODOMETRY_SIZE])
+            read_payload(data, table[i], payloads[_SENSOR_SIZE:_LOAD_AT])
             found |= VEHICLE_TRUTH
         elif message_id == _ODOMETRY_ID and system == load_sys and component == COMPONENT_LOAD:
-            read_payload(data, table[i], payloads[_SENSOR_SIZE + _ODOMETRY_SIZE :])
+            read_payload(data, table[i], payloads[_LOAD_AT:_GPS_AT])
             found |= LOAD_TRUTH
-        elif message_id != _GPS_ID and message_id != _STATE_ID:
+        elif message_id == _GPS_ID:
+            read_payload(data, table[i], payloads[_GPS_AT:])
+            found |= GPS
+        elif message_id != _STATE_ID:
             found |= OTHERS
     if found & TICK:
         header[1] = records[0].sensor.time_usec
+        read_sensors(records[0].sensor, sensed[0])
     if found & VEHICLE_TRUTH and found & LOAD_TRUTH:
         estimate_from_truth(records[0].vehicle, records[0].load, estimate)
         for i in range(STATE_SIZE):
@@ -114,6 +168,8 @@ class Tick(NamedTuple):
     """Of HIL_SENSOR; None when the datagram had none."""
     truth: bool
     """Whether `TickReader.estimate` holds the truth of this tick."""
+    gps: bool
+    """Whether `TickReader.gps` is new."""
     others: list[Frame]
 
 
@@ -123,6 +179,8 @@ class TickReader:
     def __init__(self, instance: int) -> None:
         self.estimate = np.zeros(STATE_SIZE)
         """State (18,) of the latest truth, eq. 31, ENU and FLU."""
+        self.sensed = np.zeros(1, dtype=SENSED)
+        """The latest tick's record of SENSED, shape (1,)."""
         self._systems = (vehicle_system(instance), load_system(instance))
         data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
@@ -130,7 +188,16 @@ class TickReader:
         self._view = data.data
         records = np.zeros(1, dtype=INCOMING)
         payloads = records.view(np.uint8)
-        self._read = read_tick.bind(data, self._table, records, payloads, self.estimate, self._header)
+        self.gps = records[0]["gps"]
+        """The latest HIL_GPS, a record as on the wire."""
+        self._read = read_tick.bind(
+            data, self._table, records, payloads, self.estimate, self.sensed, self._header
+        )
+
+    @property
+    def begun(self) -> bool:
+        """Whether the plant's sensors have begun afresh with the latest tick."""
+        return bool(self.sensed["has_begun"][0])
 
     def read(self, datagram: bytes) -> Tick:
         """Everything in a datagram (at most 65536 bytes)."""
@@ -143,4 +210,4 @@ class TickReader:
             known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID, _STATE_ID)
             others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] not in known]
         truth = bool(found & VEHICLE_TRUTH and found & LOAD_TRUTH)
-        return Tick(int(self._header[1]) if found & TICK else None, truth, others)
+        return Tick(int(self._header[1]) if found & TICK else None, truth, bool(found & GPS), others)

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, decode
-from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY
+from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
 from sitl_bridge.plant.faults import Faults, from_command, timeline, with_gusts
 from sitl_bridge.plant.messages import STATE, TRUTH, TickWriter
 from sitl_bridge.plant.slow_frames import LoadOnMap, SlowFrames
@@ -82,7 +82,8 @@ class Simulation:
         self._vehicle = vehicle
         self.recorder = recorder
         self._on_begin = on_begin
-        self._first_flown = 0
+        self._first_sensed = 0
+        self._sensors_due = False
         self._truth = False
         self._heard = False
         home = vehicle.home
@@ -119,8 +120,13 @@ class Simulation:
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for."""
         if self._datagram is None:
-            tick, time_usec, world = self.tick - self._first_flown, self.time_usec, self.world
+            fresh = self._sensors_due and self.tick >= self._first_sensed
+            if fresh:
+                self._begin_sensing()
+            tick, time_usec, world = self.tick - self._first_sensed, self.time_usec, self.world
             fix = world.measure(tick, not self.started)
+            if fresh:
+                world.measurement["updated"] |= SENSOR_RESET
             seen = None if world.tracker is None else world.tracker.sample(tick, world.state)
             slow = self._slow.frames(tick, time_usec, world.state, self._power, seen)
             wanted = TRUTH if self._truth and self._heard else 0
@@ -133,19 +139,32 @@ class Simulation:
         """The autopilot has answered a tick; truth, where asked for, goes out from the next tick on.
 
         So an autopilot that flies on truth arms only when the plant is known to hear its answers, and the
-        step that arms it is the scenario's first.
+        step that arms it is the scenario's first. The sensors begin afresh with the next tick, which says so
+        (HIL_SENSOR_UPDATED_RESET): an autopilot that aligns its estimate from there on, for a number of
+        ticks, does the same whenever it was started.
         """
-        self._heard = True
+        if not self._heard:
+            self._heard = True
+            self._first_sensed = self.tick + 1
+            self._sensors_due = True
+
+    def _begin_sensing(self) -> None:
+        self.world.reset_sensors()
+        self._sensors_due = False
 
     def ask_for_truth(self, wanted: bool) -> None:
         """Send ODOMETRY of vehicle and load with every tick, or no more."""
         self._truth = wanted
 
     def begin(self) -> None:
-        """The scenario begins at the current tick: initial state, fresh random streams."""
-        self.world.reset()
+        """The scenario begins at the current tick: initial state, fresh random streams of what acts.
+
+        The sensors go on as they are: biases that were estimated before the start stay what they are.
+        """
+        self.world.reset_motion()
+        if self._sensors_due:
+            self._begin_sensing()
         self.started = True
-        self._first_flown = self.tick
         self._under_way.clear()
         for _ in range(self._vehicle.loop.delay_ticks):
             self._under_way.append(self.world.trim_controls)

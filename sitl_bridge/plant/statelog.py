@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +12,7 @@ from sitl_bridge.plant.dynamics import pull_of
 from sitl_bridge.plant.parameters import PARAMETERS
 from sitl_bridge.plant.state import CABLE_HOLDS, COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
 from sitl_bridge.plant.world import World
+from sitl_bridge.rowlog import RowLog
 
 FILE_NAME = "state.parquet"
 CHUNK_ROWS = 4096
@@ -68,23 +67,16 @@ def fill_row(
 
 
 class StateLog:
-    """Collects rows, and writes them in the background in chunks, so that a tick never waits for a disk.
-
-    Values are exact doubles; the same run gives the same bytes.
-    """
+    """Collects rows; the same run gives the same bytes."""
 
     def __init__(self, path: Path, world: World) -> None:
         self.path = path
-        self._names = columns(len(world.vehicle.rotors))
+        self._log = RowLog(path, columns(len(world.vehicle.rotors)))
         keep = [*range(_ROTORS + len(world.vehicle.rotors)), *range(_FORCE, _WIDTH)]
         self._keep = np.array(keep)
         self._rows = np.zeros((CHUNK_ROWS, _WIDTH))
         self._fill = fill_row.bind(*world.log_sources(), self._rows)
         self._count = 0
-        self._chunks: queue.SimpleQueue[Array | None] = queue.SimpleQueue()
-        self._failure: Exception | None = None
-        self._writer = threading.Thread(target=self._write_chunks, name="state log", daemon=True)
-        self._writer.start()
 
     def record(self, time_s: float, world: World) -> None:
         """Keep one row."""
@@ -96,26 +88,8 @@ class StateLog:
         """Write out everything; raises what went wrong while writing."""
         if self._count:
             self._flush()
-        self._chunks.put(None)
-        self._writer.join()
-        if self._failure is not None:
-            raise self._failure
+        self._log.close()
 
     def _flush(self) -> None:
-        self._chunks.put(self._rows[: self._count, self._keep])
+        self._log.write(self._rows[: self._count, self._keep])
         self._count = 0
-
-    def _write_chunks(self) -> None:
-        try:
-            import pyarrow as pa
-            import pyarrow.parquet as pq
-
-            schema = pa.schema([(name, pa.float64()) for name in self._names])
-            with pq.ParquetWriter(self.path, schema, compression="zstd", use_dictionary=False) as writer:
-                while (chunk := self._chunks.get()) is not None:
-                    arrays: list[Any] = [pa.array(np.ascontiguousarray(column)) for column in chunk.T]
-                    writer.write_table(pa.table(arrays, schema=schema))
-        except Exception as error:  # handed to the main thread by `close`
-            self._failure = error
-            while self._chunks.get() is not None:
-                pass

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.magnetic import field_at
 from sitl_bridge.plant.battery import BatteryReading, drained, electric_power, reading
 from sitl_bridge.plant.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.dynamics import WORK_ROWS, advance, set_rotors
@@ -17,7 +18,6 @@ from sitl_bridge.plant.sensing import measure
 from sitl_bridge.plant.sensors.atmosphere import air_pressure
 from sitl_bridge.plant.sensors.gps import GpsFix, GpsReceiver
 from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
-from sitl_bridge.plant.sensors.magnetic import field_at
 from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.state import (
     CABLE_HOLDS,
@@ -54,7 +54,6 @@ class World:
         self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
         self.measurement = self.instruments.reading
         self._period = 1.0 / rate_hz
-        self._begin_sensing()
         self._force = HeldForce(vehicle.disturbance, self.step, seed)
         self._wind = HeldWind(vehicle, self.step, seed)
         self._controls = np.zeros(MOST_ROTORS)
@@ -85,23 +84,29 @@ class World:
 
     def reset(self) -> None:
         """Back to the initial state, with fresh random streams; in the air with the rotors as in hover."""
+        self.reset_motion()
+        self.reset_sensors()
+
+    def reset_motion(self) -> None:
+        """Bodies, forces and battery back to the initial state; the sensors go on as they are."""
         self.state[:] = initial_state(self.vehicle)
         self.inner[:] = initial_inner_state(self.vehicle)
         self._force.reset(self._seed)
         self._wind.reset(self._seed)
-        self.instruments.reset(self._seed)
-        self._begin_sensing()
+        battery = self.vehicle.battery
+        self._charge = battery.charge if battery is not None else 1.0
         self._speed_share[:] = 1.0
         self.set_load_mass(None)
         self.command(self.trim_controls if self.vehicle.initial.start == "hover" else STOPPED)
 
-    def _begin_sensing(self) -> None:
-        sensors, battery = self.vehicle.sensors, self.vehicle.battery
+    def reset_sensors(self) -> None:
+        """Every sensor works, with fresh random streams; the next tick that is measured is 0 or 1."""
+        sensors = self.vehicle.sensors
+        self.instruments.reset(self._seed)
         self.gps = GpsReceiver(sensors.gps, self._period, self._seed)
         self.tracker = None
         if sensors.tracker is not None:
             self.tracker = LoadTracker(sensors.tracker, self._period, self._seed)
-        self._charge = battery.charge if battery is not None else 1.0
 
     def command(self, controls: Sequence[float]) -> None:
         """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import lpmv
 
+from sitl_bridge.magnetic import EPOCH, field_at
 from sitl_bridge.plant.sensors.atmosphere import air_pressure, air_temperature
 from sitl_bridge.plant.sensors.gps import FIX_3D, NO_FIX, GpsReceiver
 from sitl_bridge.plant.sensors.instruments import (
@@ -24,7 +25,6 @@ from sitl_bridge.plant.sensors.instruments import (
     WRONG,
     Instruments,
 )
-from sitl_bridge.plant.sensors.magnetic import EPOCH, field_at
 from sitl_bridge.plant.sensors.noise import GaussMarkov, RandomWalk, White
 from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.state import STATE_SIZE

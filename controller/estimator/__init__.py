@@ -1,0 +1,1 @@
+"""Vehicle and load from inertial sensors, magnetometer, barometer and GPS: an error-state Kalman filter."""

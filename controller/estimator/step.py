@@ -1,0 +1,169 @@
+"""The compiled entry points: one tick of the filter, and changes of what it flies."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from controller.estimator.alignment import align, start_hanging
+from controller.estimator.delayed import gps, remember, tracker
+from controller.estimator.layout import (
+    ALIGNING,
+    ATTITUDE,
+    BODY_RATES_OUT,
+    CLONE_LOAD,
+    CLONE_MOTION,
+    EULER_OUT,
+    FILTER,
+    FLYING,
+    FORCE,
+    INPUT,
+    LOAD,
+    LOAD_ON_CABLE,
+    LOAD_ON_GROUND,
+    LOAD_OUT,
+    LOAD_RELEASED,
+    LOAD_VELOCITY,
+    LOAD_VELOCITY_OUT,
+    MOST_ROTORS,
+    OUTPUT_SIZE,
+    POSITION_OUT,
+    STANDING,
+    VELOCITY_OUT,
+    X_ATTITUDE,
+    X_LOAD,
+    X_LOAD_VELOCITY,
+    X_POSITION,
+    X_RATES,
+    X_VELOCITY,
+    Array,
+    Filter,
+)
+from controller.estimator.process import predict
+from controller.estimator.sensors import (
+    accelerometer,
+    barometer,
+    gyroscope,
+    load_at_rest,
+    magnetometer,
+    rest,
+)
+from controller.estimator.transitions import release, watch
+from controller.estimator.update import set_part
+from sitl_bridge.compiled import Buffer, entry_point, kernel
+
+MOST_MISSED_TICKS = 50
+SLIP_SPEED = 0.3
+"""m/s (of the velocity: m/s²), at which a slip fades at most"""
+SLIP_TIME = 1.0
+"""s, its time constant when it is small"""
+
+
+@kernel
+def report(f: Filter, out: Array) -> None:
+    """Write the estimate (18,) in the order of eq. 31, without the slip.
+
+    The slip is what GPS corrected at a stroke after an outage. It fades at a speed that a law can follow:
+    a step of metres in its feedback would throw the vehicle over.
+    """
+    x, slip = f.x, f.m.slip
+    for part in range(2):
+        size = math.sqrt(slip[3 * part] ** 2 + slip[3 * part + 1] ** 2 + slip[3 * part + 2] ** 2)
+        if size > 0.0:
+            faded = 1.0 - min(SLIP_SPEED / size, 1.0 / SLIP_TIME) * f.p.period
+            for i in range(3 * part, 3 * part + 3):
+                slip[i] *= faded
+    for i in range(3):
+        out[POSITION_OUT + i] = x[X_POSITION + i] - slip[i]
+        out[LOAD_OUT + i] = x[X_POSITION + i] + x[X_LOAD + i] - slip[i]
+        out[VELOCITY_OUT + i] = x[X_VELOCITY + i] - slip[3 + i]
+        out[LOAD_VELOCITY_OUT + i] = x[X_VELOCITY + i] + x[X_LOAD_VELOCITY + i] - slip[3 + i]
+        out[BODY_RATES_OUT + i] = x[X_RATES + i]
+    w, i, j, k = x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3]
+    out[EULER_OUT] = math.atan2(2.0 * (w * i + j * k), 1.0 - 2.0 * (i * i + j * j))
+    out[EULER_OUT + 1] = math.asin(max(-1.0, min(1.0, 2.0 * (w * j - k * i))))
+    out[EULER_OUT + 2] = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
+
+
+@entry_point(Buffer(FILTER, (1,)), Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
+def tick(record: Any, measurements: Any, out: Array) -> int:
+    """Predict to the tick's time, take in its measurements, and write the estimate `out` (18,), eq. 31.
+
+    Returns the vehicle's mode.
+    """
+    f, given = record[0], measurements[0]
+    p, m = f.p, f.m
+    if m.vehicle_mode == ALIGNING:
+        align(f, given)
+        report(f, out)
+        return int(m.vehicle_mode)
+    ticks = int((given.time - m.time) / p.period + 0.5)
+    for _ in range(min(ticks, MOST_MISSED_TICKS)):
+        predict(f)
+        if m.time > m.next_clone - 0.5 * p.period:
+            remember(f, CLONE_MOTION)
+            m.next_clone += p.clone_interval
+        if p.tracker_interval > 0.0 and m.time > m.next_load_clone - 0.5 * p.period:
+            remember(f, CLONE_LOAD)
+            m.next_load_clone += p.tracker_interval
+    m.time = given.time
+    if given.has_imu:
+        gyroscope(f, given.gyroscope)
+        accelerometer(f, given.accelerometer)
+        watch(f, given.accelerometer)
+    if given.has_magnetometer:
+        magnetometer(f, given.magnetometer)
+    if given.has_altitude:
+        barometer(f, given.altitude)
+    if given.has_gps:
+        gps(f, given)
+    if given.has_tracker:
+        tracker(f, given)
+    if m.vehicle_mode == STANDING:
+        rest(f)
+    elif m.load_mode == LOAD_ON_GROUND:
+        load_at_rest(f)
+    report(f, out)
+    return int(m.vehicle_mode)
+
+
+@entry_point(Buffer(FILTER, (1,)), Buffer(np.float64, (MOST_ROTORS,)))
+def command(record: Any, rotor_speed: Array) -> int:
+    """Note the rotor speeds (rad/s) that are commanded from this tick on."""
+    m = record[0].m
+    row = m.command_count % m.commands.shape[0]
+    for i in range(MOST_ROTORS):
+        m.commands[row, i] = rotor_speed[i]
+    m.command_count += 1
+    return int(m.command_count)
+
+
+@entry_point(Buffer(FILTER, (1,)), int, int)
+def change(record: Any, vehicle_mode: int, load_mode: int) -> int:
+    """Change what holds the vehicle and what the load does; returns the vehicle's mode."""
+    f = record[0]
+    m = f.m
+    if load_mode != m.load_mode:
+        if load_mode == LOAD_RELEASED:
+            release(f)
+        elif load_mode == LOAD_ON_CABLE and m.load_mode == LOAD_RELEASED:
+            start_hanging(f, 0.3, 1.0)
+        m.load_mode = load_mode
+    if vehicle_mode == FLYING and m.vehicle_mode == STANDING:
+        # What held it is gone; forces, rates and load start anew.
+        set_part(f, FORCE, 3, f.p.force_std)
+        for part in (LOAD, LOAD_VELOCITY):
+            for i in range(part, part + 3):
+                f.P[i, i] += f.p.initial_std[i] ** 2
+        m.vehicle_mode = FLYING
+    elif vehicle_mode == STANDING and m.vehicle_mode == FLYING:
+        for i in range(ATTITUDE, ATTITUDE + 3):
+            f.P[i, i] += 1e-4
+        m.vehicle_mode = STANDING
+    m.slack_time = 0.0
+    m.pull_time = 0.0
+    for axis in range(3):
+        m.pull[axis] = 0.0
+    return int(m.vehicle_mode)

@@ -1,0 +1,177 @@
+"""Evaluate the estimator offline over seeds, and draw the figures of docs/estimator.md.
+
+PYTHONPATH=. python scripts/estimator_figures.py --seeds 20 --duration 120 --out docs/figures
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from controller.estimator.bound import load_relative_bound
+from controller.estimator.layout import SENSORS
+from controller.estimator.tuning import CONSUMER, RTK
+from controller.estimator.weights import estimated_weights
+from sitl_bridge.vehicle import load_vehicle
+from tests.estimator.flights import PERIOD, Flight, Sample, Sensors, fly
+
+CASES = (
+    (1.0, "consumer", True),
+    (10.0, "consumer", True),
+    (1.0, "consumer", False),
+    (10.0, "consumer", False),
+    (1.0, "rtk", False),
+    (10.0, "rtk", False),
+)
+TUNINGS = {"consumer": CONSUMER, "rtk": RTK}
+INDEPENDENT_TIME = 10.0
+"""s after which errors are taken as independent, for the bounds of NEES."""
+
+
+def evaluate(rest_length: float, sensors: str, on_truth: bool, seeds: int, duration: float) -> dict[str, Any]:
+    """One row of the table: root mean squares over the seeds, the worst seed, consistency."""
+    overrides = ["disturbance.force_std=5", f"cable.rest_length={rest_length}"]
+    vehicle, tuning = load_vehicle("paper", overrides), TUNINGS[sensors]
+    relative, absolute, nees, innovations, within = [], [], [], [], []
+    for seed in range(seeds):
+        flight = fly(
+            vehicle,
+            estimated_weights(vehicle),
+            duration,
+            seed,
+            sensors=Sensors(tuning=tuning),
+            on_truth=on_truth,
+        )
+        relative.append(flight.load_relative_error())
+        absolute.append(flight.load_error(np.array(vehicle.initial.load_position)))
+        nees.append(flight.nees[500:-1])
+        m = flight.estimator.memory
+        innovations.append(m["nis_sum"][:6] / m["nis_count"][:6])
+        within.append(m["within"][:6] / m["seen"][:6])
+    return {
+        "rest_length_m": rest_length,
+        "sensors": sensors,
+        "feedback": "truth" if on_truth else "estimate",
+        "load_relative_rms_m": np.sqrt(np.mean(np.square(relative), axis=0)).round(5).tolist(),
+        "load_relative_worst_m": np.max(relative, axis=0).round(5).tolist(),
+        "load_relative_bound_m": load_relative_bound(vehicle, PERIOD, tuning).round(5).tolist(),
+        "load_rms_m": np.sqrt(np.mean(np.square(absolute), axis=0)).round(5).tolist(),
+        "load_worst_m": np.max(absolute, axis=0).round(5).tolist(),
+        "nees_mean": round(float(np.mean(nees)), 4),
+        "nees_bound": round(
+            float(1.96 * np.sqrt(2.0 / (15 * seeds * (duration - 20) / INDEPENDENT_TIME))), 4
+        ),
+        "innovations_in_bounds": dict(zip(SENSORS, np.mean(within, axis=0).round(4).tolist(), strict=False)),
+        "nis": dict(zip(SENSORS, np.mean(innovations, axis=0).round(4).tolist(), strict=False)),
+    }
+
+
+def estimate_figure(flight: Flight, path: Path) -> None:
+    """Error of the load relative to the vehicle, with three standard deviations."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(3, 1, sharex=True, figsize=(9, 7))
+    cov = np.sqrt(np.diag(flight.estimator.error_covariance))[19:22]
+    error = flight.estimate - flight.truth
+    for axis, (plot, name) in enumerate(zip(axes, "xyz", strict=True)):
+        plot.plot(flight.time, 100 * (error[:, 3 + axis] - error[:, axis]), lw=0.6, label="error")
+        for sign in (-3, 3):
+            plot.axhline(100 * sign * cov[axis], color="C3", lw=0.8, label="3 σ" if sign > 0 else None)
+        plot.set_ylabel(f"{name} / cm")
+        plot.grid(alpha=0.3)
+    axes[0].legend(loc="upper right")
+    axes[0].set_title("Load relative to the vehicle, estimated minus true")
+    axes[-1].set_xlabel("time / s")
+    figure.tight_layout()
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def outage_figure(flight: Flight, begin: float, end: float, path: Path) -> None:
+    """Vehicle position and load through a GPS outage."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 1, sharex=True, figsize=(9, 6))
+    error = flight.estimate - flight.truth
+    std = flight.std[: len(flight.time) // 10]
+    coarse = flight.time[::10][: len(std)]
+    for axis, name in enumerate("xyz"):
+        axes[0].plot(flight.time, error[:, axis], f"C{axis}", lw=0.8, label=f"{name} error")
+        axes[1].plot(flight.time, flight.truth[:, 3 + axis], f"C{axis}", lw=0.8, label=f"load {name}")
+    axes[0].fill_between(coarse, -3 * std[:, 0], 3 * std[:, 0], color="0.85", label="3 σ (x)")
+    for plot in axes:
+        plot.axvspan(begin, end, color="C3", alpha=0.1)
+        plot.grid(alpha=0.3)
+        plot.legend(loc="upper left", ncols=4)
+    axes[0].set_ylabel("vehicle position error / m")
+    axes[1].set_ylabel("load from its reference / m")
+    axes[1].set_xlabel("time / s")
+    axes[0].set_title("No GPS for ten seconds (shaded)")
+    figure.tight_layout()
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def innovation_figure(samples: list[Any], path: Path) -> None:
+    """Normalised innovations of GPS and accelerometer against the normal distribution."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.5))
+    grid = np.linspace(-4, 4, 200)
+    for plot, (name, values) in zip(axes, samples, strict=True):
+        plot.hist(values, bins=60, range=(-4, 4), density=True, color="C0", alpha=0.6)
+        plot.plot(grid, np.exp(-0.5 * grid**2) / np.sqrt(2 * np.pi), "C3")
+        inside = np.mean(np.abs(values) < 1.96)
+        plot.set_title(f"{name}: {100 * inside:.1f} % within 1.96 σ")
+        plot.set_xlabel("innovation / its standard deviation")
+    figure.tight_layout()
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def draw(out: Path) -> None:
+    """All figures."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    out.mkdir(parents=True, exist_ok=True)
+    vehicle = load_vehicle("paper", ["disturbance.force_std=5"])
+    weights = estimated_weights(vehicle)
+    estimate_figure(fly(vehicle, weights, 60.0, 1), out / "estimator_load.png")
+
+    def outage(sample: Sample) -> None:
+        if 10.0 <= sample.time < 20.0:
+            sample.gps = None
+
+    flight = fly(vehicle, weights, 40.0, 3, on_truth=False, spoil=outage)
+    outage_figure(flight, 10.0, 20.0, out / "estimator_outage.png")
+    flight = fly(vehicle, weights, 60.0, 2)
+    samples = [
+        ("GPS position", np.ravel(flight.gps_innovations[100:])),
+        ("accelerometer", np.ravel(flight.accelerometer_innovations[350:])),
+    ]
+    innovation_figure(samples, out / "estimator_innovations.png")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--duration", type=float, default=120.0)
+    parser.add_argument("--out", type=Path, default=Path("docs/figures"))
+    parser.add_argument("--no-table", action="store_true", help="only the figures")
+    arguments = parser.parse_args()
+    if not arguments.no_table:
+        for case in CASES:
+            print(json.dumps(evaluate(*case, arguments.seeds, arguments.duration)), flush=True)
+    draw(arguments.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,52 @@
+"""Parquet files of numbers, written in the background in chunks, so that a tick never waits for a disk."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class RowLog:
+    """Takes chunks of rows. Values are exact doubles; the same chunks give the same bytes."""
+
+    def __init__(self, path: Path, names: Sequence[str]) -> None:
+        self.path = path
+        self._names = names
+        self._chunks: queue.SimpleQueue[Array | None] = queue.SimpleQueue()
+        self._failure: Exception | None = None
+        self._writer = threading.Thread(target=self._write_chunks, name=path.name, daemon=True)
+        self._writer.start()
+
+    def write(self, chunk: Array) -> None:
+        """Write rows (n, columns), which nobody changes any more."""
+        self._chunks.put(chunk)
+
+    def close(self) -> None:
+        """Write out everything; raises what went wrong while writing."""
+        self._chunks.put(None)
+        self._writer.join()
+        if self._failure is not None:
+            raise self._failure
+
+    def _write_chunks(self) -> None:
+        try:
+            import pyarrow as pa
+            import pyarrow.parquet as pq
+
+            schema = pa.schema([(name, pa.float64()) for name in self._names])
+            with pq.ParquetWriter(self.path, schema, compression="zstd", use_dictionary=False) as writer:
+                while (chunk := self._chunks.get()) is not None:
+                    arrays: list[Any] = [pa.array(np.ascontiguousarray(column)) for column in chunk.T]
+                    writer.write_table(pa.table(arrays, schema=schema))
+        except Exception as error:  # handed to the main thread by `close`
+            self._failure = error
+            while self._chunks.get() is not None:
+                pass

@@ -1,0 +1,149 @@
+"""The covariance over a million updates, the transition against differences, and the tick's cost."""
+
+import time
+
+import numpy as np
+import pytest
+
+from controller.estimator.filter import Estimator, eq31_jacobian
+from controller.estimator.layout import ERROR_SIZE, SENSORS
+from controller.estimator.tuning import CONSUMER
+from sitl_bridge.vehicle import hover_rotor_speed
+from tests.estimator.flights import PERIOD
+from tests.estimator.test_accuracy import paper
+
+
+def hovering(ticks: int, rest_length: float = 1.0) -> Estimator:
+    """A filter that hovers with sensors that read what it expects, but for the magnetometer's noise."""
+    vehicle = paper(rest_length)
+    estimator = Estimator(vehicle, PERIOD)
+    for k in range(200 + ticks):
+        load(estimator, k)
+        if k == 200:
+            estimator.take_off()
+        estimator.tick(k * PERIOD)
+        if k >= 200:
+            estimator.command(np.full(4, hover_rotor_speed(vehicle)))
+    return estimator
+
+
+def load(estimator: Estimator, k: int) -> None:
+    east, north, up = CONSUMER.field
+    estimator.imu((0.0, 0.0, 9.81), (0.0, 0.0, 0.0))
+    estimator.magnetometer((east + 1e-3 * (k % 3), north, up))
+    estimator.barometer(0.0)
+    if k % 25 == 0:
+        estimator.gps(max(0.0, k * PERIOD - 0.108), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+def test_covariance_over_a_million_updates() -> None:
+    """Symmetric to the last bit after a prediction's worth, positive, and unchanged once it is steady."""
+    estimator = hovering(5000)
+    steady = estimator.error_covariance.copy()
+    m = estimator.memory
+    fused = int(m["nis_count"].sum())
+    k = 5200
+    while int(m["nis_count"].sum()) - fused < 1_000_000:
+        load(estimator, k)
+        estimator.tick(k * PERIOD)
+        k += 1
+    cov = estimator.error_covariance
+    scale = np.sqrt(np.diag(cov))
+    known = scale > 0.0
+    normalised = (cov / np.outer(scale, scale).clip(1e-300))[np.ix_(known, known)]
+    assert np.abs(normalised - normalised.T).max() < 1e-9
+    assert np.linalg.eigvalsh(normalised).min() > 1e-9
+    assert np.all(np.diag(cov)[:12] <= 1.05 * np.diag(steady)[:12])
+    assert np.all(np.isfinite(estimator.state()))
+
+
+def test_time_of_one_tick() -> None:
+    """One whole tick with every 250 Hz sensor within 60 µs of processor time, the call included."""
+    estimator = hovering(500)
+    best = np.inf
+    for batch in range(5):
+        spent = 0
+        for k in range(700 + 500 * batch, 1200 + 500 * batch):
+            load(estimator, k)
+            start = time.process_time_ns()
+            estimator.tick(k * PERIOD)
+            spent += time.process_time_ns() - start
+        best = min(best, spent / 500 * 1e-3)
+    assert best < 60.0, f"{best:.1f} us"
+
+
+def test_covariance_in_the_order_of_eq_31() -> None:
+    """The load's absolute variance has both parts and their correlation; attitude is in Euler angles."""
+    estimator = hovering(1000)
+    cov, error = estimator.covariance(), estimator.error_covariance
+    assert cov.shape == (18, 18)
+    assert cov[3, 3] == pytest.approx(error[0, 0] + 2.0 * error[0, 19] + error[19, 19])
+    assert eq31_jacobian(0.0, 0.0)[15:18, 6:9] == pytest.approx(np.eye(3))
+
+
+def test_transition_against_differences() -> None:
+    """The transition matrix that a tick used, against differences of the prediction itself."""
+    estimator = hovering(50)
+    nominal = estimator.nominal
+    nominal[6:10] = np.array([0.98, 0.1, -0.12, 0.1]) / np.linalg.norm([0.98, 0.1, -0.12, 0.1])
+    nominal[10:13] = (0.3, -0.2, 0.1)
+    nominal[20:23] = (0.4, -0.3, -1.8)
+    nominal[23:26] = (0.3, 0.5, -0.4)
+    nominal[26:29] = (0.2, 0.1, -0.1)
+    start = nominal.copy()
+    now = float(estimator.memory["time"])
+
+    def predicted(delta: np.ndarray) -> np.ndarray:
+        nominal[:] = moved(start, delta)
+        estimator.memory["time"] = now
+        estimator.tick(now + PERIOD)
+        return nominal.copy()
+
+    base = predicted(np.zeros(ERROR_SIZE))
+    transition = estimator._filter["transition"][0].copy()
+    step = 1e-5
+    for column in [*range(12), *range(19, 28)]:
+        delta = np.zeros(ERROR_SIZE)
+        delta[column] = step
+        forward = difference(predicted(delta), base)
+        delta[column] = -step
+        backward = difference(predicted(delta), base)
+        numeric = (forward - backward) / (2.0 * step)
+        rows = np.r_[0:12, 19:28]
+        # second order in the step: what is left is of third order, 0.004 s times rates of at most 20 / s
+        assert transition[rows, column] == pytest.approx(numeric[rows], abs=4e-4), column
+
+
+def moved(nominal: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    """The nominal state plus an error."""
+    out = nominal.copy()
+    out[0:6] += delta[0:6]
+    out[10:33] += delta[9:32]
+    x, y, z = 0.5 * delta[6:9]
+    w, i, j, k = nominal[6:10]
+    turned = np.array(
+        [
+            w - i * x - j * y - k * z,
+            i + w * x + j * z - k * y,
+            j + w * y + k * x - i * z,
+            k + w * z + i * y - j * x,
+        ]
+    )
+    out[6:10] = turned / np.linalg.norm(turned)
+    return out
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """a minus b as an error (32,)."""
+    w, i, j, k = b[6:10]
+    conjugate = np.array([[w, i, j, k], [-i, w, k, -j], [-j, -k, w, i], [-k, j, -i, w]])
+    turn = conjugate @ a[6:10]
+    return np.concatenate([a[0:6] - b[0:6], 2.0 * turn[1:] / turn[0], a[10:33] - b[10:33]])
+
+
+def test_health_names_every_sensor() -> None:
+    health = hovering(100).health()
+    assert set(health.sensors) == set(SENSORS)
+    assert health.aligned
+    assert health.position
+    assert not health.dead_reckoning

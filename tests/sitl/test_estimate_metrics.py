@@ -1,0 +1,70 @@
+"""Figures of the estimate, from logs whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.estimate_log import COLUMNS, COVARIANCE_COLUMNS, UPPER
+from sitl.estimate_metrics import Log, errors, estimate_metrics
+from sitl_bridge.frames import quaternion_from_euler
+from sitl_bridge.plant.state import COLUMNS as TRUE_COLUMNS
+
+ROWS = 5001
+
+
+@pytest.fixture(scope="module")
+def logs() -> tuple[Log, Log, Log]:
+    """25 s at 200 Hz in which estimates err by drawn errors of known covariance."""
+    generator = np.random.default_rng(4)
+    times = np.arange(ROWS) / 200.0
+    euler = generator.uniform(-0.3, 0.3, (ROWS, 3))
+    state = generator.standard_normal((ROWS, len(TRUE_COLUMNS)))
+    state[:, 6:10] = [quaternion_from_euler((a, b, c)) for a, b, c in euler.tolist()]
+    truth = np.hstack(
+        [state[:, 0:3], state[:, 13:16], state[:, 3:6], state[:, 16:19], state[:, 10:13], euler]
+    )
+    root = 0.1 * generator.standard_normal((18, 18))
+    error = generator.standard_normal((ROWS, 18)) @ root.T
+    innovations = np.cumsum([[10.0, 9.0]] * ROWS, axis=0)
+    estimate = np.hstack([times[:, None], truth - error, innovations])
+    covariance = np.tile((root @ root.T)[UPPER], (ROWS // 10 + 1, 1))
+    return (
+        {"time_s": times, **dict(zip(TRUE_COLUMNS, state.T, strict=True))},
+        dict(zip(COLUMNS, estimate.T, strict=True)),
+        dict(zip(COVARIANCE_COLUMNS, np.hstack([times[::10, None], covariance]).T, strict=True)),
+    )
+
+
+def test_of_known_errors(logs: tuple[Log, Log, Log]) -> None:
+    state, estimate, covariance = logs
+    load = np.stack([state[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    figures = estimate_metrics(state, estimate, covariance, load - [0.1, -0.2, 0.0])
+    assert figures["load_rms_m"] == pytest.approx([0.1, 0.2, 0.0])
+    assert figures["innovations_in_bounds"] == pytest.approx(0.9)
+    assert figures["nees_mean"] == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / (100 * 15)))
+    late = state["time_s"] >= 20.0
+    relative = [
+        (state[f"load_{axis}_m"] - estimate[f"load_{axis}_m"])
+        - (state[f"vehicle_{axis}_m"] - estimate[f"vehicle_{axis}_m"])
+        for axis in "xyz"
+    ]
+    expected = [np.sqrt(np.mean(axis[late] ** 2)) for axis in relative]
+    assert figures["load_relative_rms_m"] == pytest.approx(expected)
+
+
+def test_a_row_that_was_lost_shifts_nothing(logs: tuple[Log, Log, Log]) -> None:
+    state, estimate, covariance = logs
+    load = np.stack([state[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    whole = estimate_metrics(state, estimate, covariance, load)
+    kept = np.delete(np.arange(ROWS), [4100, 4500, 4501])
+    fewer = {name: column[kept] for name, column in estimate.items()}
+    parts = estimate_metrics(state, fewer, covariance, load)
+    assert parts["nees_mean"] == pytest.approx(whole["nees_mean"], rel=0.05)
+    assert parts["load_relative_rms_m"] == pytest.approx(whole["load_relative_rms_m"], rel=0.01)
+
+
+def test_angles_differ_the_short_way_round() -> None:
+    truth, estimate = np.zeros((1, 18)), np.zeros((1, 18))
+    truth[0, 17], estimate[0, 17] = 3.1, -3.1
+    assert errors(truth, estimate)[0, 17] == pytest.approx(6.2 - 2.0 * np.pi)
