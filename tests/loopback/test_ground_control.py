@@ -133,7 +133,7 @@ def test_refusals_say_why(tmp_path: Path) -> None:
     assert "armed" not in vehicle.log.read_text()
 
 
-def test_new_weights_fly_without_a_missed_tick(tmp_path: Path) -> None:
+def test_new_weights_are_taken_in_flight(tmp_path: Path) -> None:
     async def to_height(connection: str) -> None:
         async with mavsdk_vehicle(connection) as vehicle:
             await take_off(vehicle, 5.0)
