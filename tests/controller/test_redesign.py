@@ -23,6 +23,8 @@ def test_the_background_designs_the_same() -> None:
     for found, expected, usual in zip(
         result, guided_designs(vehicle, 250.0, emphasis), guided_designs(vehicle, 250.0), strict=True
     ):
-        np.testing.assert_allclose(found["state_gain"], expected["state_gain"])
+        # Gains that are zero in theory are rounding, which another process' linear algebra may do otherwise.
+        rounding = 1e-12 * np.abs(expected["state_gain"]).max()
+        np.testing.assert_allclose(found["state_gain"], expected["state_gain"], atol=rounding)
         assert np.abs(found["state_gain"] - usual["state_gain"]).max() > 0.1
     assert process.result() is None
