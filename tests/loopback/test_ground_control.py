@@ -174,8 +174,6 @@ def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
     [
         ("connect.py", "mavsdk"),
         ("mission.py", "mavsdk"),
-        ("load_figure_eight.py", "mavproxy"),
-        ("parameter_sweep.py", "mavsdk"),
     ],
 )
 def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
