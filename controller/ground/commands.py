@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import common as mavlink
 
@@ -72,28 +72,23 @@ def command_of(message: Any, to_load: bool) -> Command:
     return Command(message.command, *p, x, y, message.z, relative, fault, to_load)
 
 
-class Requests:
+class Requests(Protocol):
     """What commands can ask of other services; the station fills it in for the peer that asks."""
 
     def send_message(self, message_id: int, index: float) -> bool:
         """Send one message once; False if there is no such message."""
-        raise NotImplementedError
 
     def set_interval(self, message_id: float, microseconds: float) -> Verdict:
         """Stream a message at an interval."""
-        raise NotImplementedError
 
     def send_interval(self, message_id: float) -> None:
         """Send MESSAGE_INTERVAL."""
-        raise NotImplementedError
 
     def storage(self, action: float) -> Verdict:
         """Load (0), save (1) or reset (2) the parameters."""
-        raise NotImplementedError
 
     def say(self, text: str) -> None:
         """A STATUSTEXT that comes with an acceptance."""
-        raise NotImplementedError
 
 
 class Memory:

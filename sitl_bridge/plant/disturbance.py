@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +15,7 @@ from sitl_bridge.vehicle import Disturbance, Vehicle
 STREAM = "white force"
 
 
-class HeldTable:
+class HeldTable(ABC):
     """A table of draws, rows of (6,) for vehicle and load, world; row k acts `hold_steps` steps."""
 
     def __init__(self, hold_time: float, step: float) -> None:
@@ -46,9 +48,9 @@ class HeldTable:
         elif not self.constant:
             self.now[:] = self.table[self.next_step // self.hold_steps]
 
+    @abstractmethod
     def draw(self) -> None:
         """Fill the whole table."""
-        raise NotImplementedError
 
     def _fill(self) -> None:
         self.draw()
