@@ -27,12 +27,12 @@ import importlib
 import json
 import os
 import stat
+import struct
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -91,8 +91,8 @@ class EntryPoint:
     """A compiled function; loaded, and compiled if need be, when it is first bound or called."""
 
     def __init__(self, function: Callable[..., Any], arguments: tuple[Any, ...], returns: Scalar) -> None:
-        self.python = function
-        """The same function, uncompiled."""
+        self.python = kernel(function)
+        """The same function, uncompiled; for other compiled functions to call, as a kernel."""
         self.__doc__ = function.__doc__
         self.name = function.__name__
         self.arguments = arguments
@@ -108,14 +108,16 @@ class EntryPoint:
         if len(arrays) != buffers:
             raise TypeError(f"{self.name}: {len(arrays)} arrays, expected {buffers}")
         addresses = [self._address(index, array) for index, array in enumerate(arrays)]
-        bound = _Bound(self._load(), *addresses)
-        bound.arrays = arrays  # keep alive what the addresses point to
-        return bound
+        return _bound(self._load(), addresses, arrays, self._scalars())
 
     def __call__(self, *arguments: Any) -> Any:
         """Call with arrays and scalars; convenient, not fast."""
         count = sum(isinstance(argument, Buffer) for argument in self.arguments)
         return self.bind(*arguments[:count])(*arguments[count:])
+
+    def _scalars(self) -> str:
+        """Format of the scalar arguments, for `struct`."""
+        return "".join("q" if a is int else "d" for a in self.arguments if not isinstance(a, Buffer))
 
     def _address(self, index: int, array: NDArray[Any]) -> int:
         declared = self.arguments[index]
@@ -132,12 +134,12 @@ class EntryPoint:
     def _load(self) -> Any:
         if self._function is None:
             module = self.python.__module__
-            kinds: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double}
-            types = [ctypes.c_void_p if isinstance(a, Buffer) else kinds[a] for a in self.arguments]
             address = _engine(module).get_function_address(_symbol(module, self.name))
             if not address:  # calling it would crash
                 raise RuntimeError(f"{module} has no entry point {self.name} at module level")
-            self._function = ctypes.CFUNCTYPE(kinds[self.returns], *types)(address)
+            self._function = ctypes.CFUNCTYPE(ctypes.c_int64 if self.returns is int else ctypes.c_double)(
+                address
+            )
         return self._function
 
     def c_callback(self) -> tuple[str, str]:
@@ -147,28 +149,52 @@ class EntryPoint:
         names = [f"a{index}" for index in range(len(self.arguments))]
         scope: dict[str, Any] = {
             "carray": numba.carray,
-            "target": numba.njit(error_model="numpy")(self.python),
+            "target": self.python,
         }
-        types, values = [], []
+        buffers = sum(isinstance(argument, Buffer) for argument in self.arguments)
+        values: list[str] = []
         for name, argument in zip(names, self.arguments, strict=True):
             if isinstance(argument, Buffer):
-                dtype = np.dtype(argument.dtype)
-                scope[f"{name}_dtype"] = dtype
-                types.append(numba.types.CPointer(numba.from_dtype(dtype)))
-                values.append(f"carray({name}, {argument.shape!r}, {name}_dtype)")
+                scope[f"{name}_dtype"] = np.dtype(argument.dtype)
+                values.append(f"carray(arrays[{len(values)}], {argument.shape!r}, {name}_dtype)")
             else:
-                types.append(numba.types.int64 if argument is int else numba.types.float64)
-                values.append(name)
-        exec(f"def call({', '.join(names)}):\n    return target({', '.join(values)})", scope)
+                scope[f"{name}_dtype"] = np.dtype(np.int64 if argument is int else np.float64)
+                shape = (len(values) - buffers + 1,)
+                values.append(f"carray(arrays[{buffers}], {shape!r}, {name}_dtype)[{len(values) - buffers}]")
+        exec(f"def call(arrays):\n    return target({', '.join(values)})", scope)
         result = numba.types.int64 if self.returns is int else numba.types.float64
-        callback = numba.cfunc(result(*types))(scope["call"])
+        arrays = numba.types.CPointer(numba.types.voidptr)
+        callback = numba.cfunc(result(arrays))(scope["call"])
         return callback.inspect_llvm(), callback.native_name
 
 
-class _Bound(partial[Any]):
-    """A partial that keeps the arrays alive whose addresses it holds."""
+def _bound(
+    function: Any, addresses: list[int], arrays: tuple[NDArray[Any], ...], scalars: str
+) -> Callable[..., Any]:
+    """A C function of one pointer, to a table of addresses, as a callable that takes the scalars.
 
-    arrays: tuple[NDArray[Any], ...]
+    The scalars go through memory too: for each argument of its own ctypes would take longer than most of
+    these functions run.
+    """
+    values = bytearray(max(1, struct.calcsize(scalars)))
+    anchor = (ctypes.c_char * len(values)).from_buffer(values)
+    table = np.array([*addresses, ctypes.addressof(anchor)], np.uintp)
+    pointer = ctypes.c_void_p(table.ctypes.data)
+    call: Callable[..., Any]
+    if scalars:
+        pack_into = struct.Struct("=" + scalars).pack_into
+
+        def call(*scalars: Any) -> Any:
+            pack_into(values, 0, *scalars)
+            return function(pointer)
+
+    else:
+
+        def call() -> Any:
+            return function(pointer)
+
+    call.keeps = (arrays, table, anchor)  # type: ignore[attr-defined]  # they live as long as it does
+    return call
 
 
 _engines: dict[str, Any] = {}

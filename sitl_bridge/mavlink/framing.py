@@ -44,28 +44,44 @@ def _crc_extra() -> NDArray[np.int16]:
     return table
 
 
-def _crc_table() -> NDArray[np.uint16]:
-    """CRC-16/MCRF4XX (polynomial 0x1021, reflected) of each byte."""
-    table = np.zeros(256, dtype=np.uint16)
+_SLICES = 8
+
+
+def _crc_tables() -> NDArray[np.int32]:
+    """CRC-16/MCRF4XX (polynomial 0x1021, reflected): row k is of each byte with k zero bytes behind it."""
+    table = np.zeros((_SLICES, 256), dtype=np.int32)
     for byte in range(256):
         value = byte
-        for _ in range(8):
-            value = value >> 1 ^ (0x8408 if value & 1 else 0)
-        table[byte] = value
+        for row in range(_SLICES):
+            for _ in range(8):
+                value = value >> 1 ^ (0x8408 if value & 1 else 0)
+            table[row, byte] = value
     return table
 
 
 CRC_EXTRA = _crc_extra()
-_CRC_TABLE = _crc_table()
+_CRC_TABLES = _crc_tables()
 
 
 @kernel
 def checksum(data: Bytes, start: int, stop: int, seed: int) -> int:
-    """MAVLink's checksum of data[start:stop] followed by the message's seed byte."""
+    """MAVLink's checksum of data[start:stop] followed by the message's seed byte.
+
+    Eight bytes at a time ("slicing by 8"): byte by byte each table look-up waits for the one before.
+    """
     crc = 0xFFFF
-    for index in range(start, stop):
-        crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ int(data[index])) & 0xFF])
-    return crc >> 8 ^ int(_CRC_TABLE[(crc ^ seed) & 0xFF])
+    index = start
+    while index + _SLICES <= stop:
+        value = int(_CRC_TABLES[7, int(data[index]) ^ crc & 0xFF])
+        value ^= int(_CRC_TABLES[6, int(data[index + 1]) ^ crc >> 8])
+        for k in range(2, _SLICES):
+            value ^= int(_CRC_TABLES[_SLICES - 1 - k, int(data[index + k])])
+        crc = value
+        index += _SLICES
+    while index < stop:
+        crc = crc >> 8 ^ int(_CRC_TABLES[0, (crc ^ int(data[index])) & 0xFF])
+        index += 1
+    return crc >> 8 ^ int(_CRC_TABLES[0, (crc ^ seed) & 0xFF])
 
 
 @kernel
