@@ -2,6 +2,6 @@
 
 import sys
 
-from sitl.cli import main
+from sitl.start import main
 
 sys.exit(main())
