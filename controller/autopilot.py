@@ -8,7 +8,7 @@ import numpy as np
 
 from controller.allocation import allocation
 from controller.designs import design
-from controller.law import WORK, engaged_memory
+from controller.law import WORK, Law, engaged_memory
 from controller.reference import Path
 from controller.state import LOAD_POSITION, Array
 from controller.step import control_step
@@ -26,8 +26,8 @@ class Autopilot:
         self, vehicle: Vehicle, design_name: str, rate_hz: float, path_from: PathFrom, controls: Array
     ) -> None:
         self.armed = False
-        self.ticks = 0
-        """Control steps since it armed."""
+        self.law: Law | None = None
+        """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
         self._path_from = path_from
         self._design = design(design_name, vehicle, rate_hz)
@@ -38,6 +38,7 @@ class Autopilot:
         """Stop the rotors; the next step arms and starts afresh."""
         self.armed = False
         self._step = None
+        self.law = None
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""
@@ -47,16 +48,8 @@ class Autopilot:
         if self._step is None:
             load = estimate[LOAD_POSITION]
             path = self._path_from((float(load[0]), float(load[1]), float(load[2])))
-            self._step = control_step.bind(
-                self._design,
-                self._allocation,
-                path,
-                engaged_memory(load),
-                np.zeros(1, dtype=WORK),
-                estimate,
-                self._controls,
-            )
+            law = (self._design, self._allocation, path, engaged_memory(load), np.zeros(1, dtype=WORK))
+            self._step = control_step.bind(*law, estimate, self._controls)
+            self.law = law
             self.armed = True
-            self.ticks = 0
         self._step()
-        self.ticks += 1

@@ -49,6 +49,7 @@ class EstimateFeedback:
 
     name = "estimate"
     needs_truth = False
+    plain = False
 
     def __init__(self, vehicle: Vehicle, rate_hz: float, log: EstimateLog | None = None) -> None:
         self.estimator = Estimator(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))

@@ -14,6 +14,8 @@ class Feedback(Protocol):
     name: str
     needs_truth: bool
     """Whether the plant is to be asked for ODOMETRY."""
+    plain: bool
+    """Whether `take` does no more than to hand on the reader's estimate, and `flown` nothing."""
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick; None while there is none to fly on."""
@@ -30,6 +32,7 @@ class TruthFeedback:
 
     name = "truth"
     needs_truth = True
+    plain = True
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The state that the plant says it is in."""

@@ -107,6 +107,9 @@ class GuidedAutopilot:
         self._view: VehicleView | None = None
         self._heard = -math.inf
 
+    law = None
+    """Ground control may want something else at any step."""
+
     @property
     def armed(self) -> bool:
         """Whether the rotors turn."""

@@ -78,6 +78,8 @@ WORK = np.dtype(
 Design = NDArray[np.void]
 Memory = NDArray[np.void]
 Work = NDArray[np.void]
+Law = tuple[Design, NDArray[np.void], NDArray[np.void], Memory, Work]
+"""A law in flight: design, allocation, reference path, memory and scratch."""
 
 
 def engaged_memory(load_position: Array) -> Memory:

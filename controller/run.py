@@ -63,7 +63,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         from controller.guided_run import Guided
 
         guided = Guided(options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say)
-        session = new_session(guided.autopilot, options.instance, speaker.say, feedback)
+        session = new_session(guided.autopilot, options.instance, speaker.say, feedback, options.rate_hz)
     else:
         path_from = options.path_from
         session = new_session(
@@ -71,6 +71,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
             options.instance,
             speaker.say,
             feedback,
+            options.rate_hz,
         )
     speaker.say(
         f"{options.vehicle.name}, {options.design} design on {options.feedback} at {options.rate_hz:g} Hz, "
@@ -105,7 +106,7 @@ def _loop(
     session: HilSession, link: Link, most_steps: int | None, stop: StopRequest, guided: Guided | None
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
-    while not stop and (most_steps is None or session.steps < most_steps):
+    while stop.reason is None and (most_steps is None or session.steps < most_steps):
         deadline = session.next_deadline()
         if guided is not None:
             deadline = min(deadline, guided.next_deadline(time.monotonic()))

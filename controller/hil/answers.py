@@ -55,10 +55,13 @@ class AnswerWriter:
         self._packer = packer
         record, payload = HIL_ACTUATOR_CONTROLS.record()
         out = np.zeros(ANSWER_SIZE, dtype=np.uint8)
-        self._view = out.data
+        self.buffers = (record, payload, out)
+        """The arrays of `write_answer` beside the controls."""
+        self.view = out.data
+        """Where an answer is written."""
         self._write = write_answer.bind(record, payload, self.controls, out)
 
     def answer(self, time_usec: int, armed: bool) -> bytes:
         """The frame that answers the tick of `time_usec`."""
         length = self._write(time_usec, armed, self._packer.next_sequence(), self._system)
-        return bytes(self._view[:length])
+        return bytes(self.view[:length])

@@ -13,7 +13,10 @@ from pymavlink.dialects.v20 import common
 
 from controller.feedback import Feedback, TruthFeedback
 from controller.hil.answers import AnswerWriter
+from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
+from controller.hil.truth_tick import PlainTick, answer_truth
+from controller.law import Law
 from controller.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
@@ -33,6 +36,10 @@ class Pilot(Protocol):
     @property
     def armed(self) -> bool:
         """Whether the rotors turn."""
+
+    @property
+    def law(self) -> Law | None:
+        """The arrays of `control_step` while `step` does no more than that; None: `step` is to be called."""
 
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31, of the tick of `time_usec`."""
@@ -55,6 +62,7 @@ class HilSession:
         instance: int,
         say: Callable[[str], None],
         feedback: Feedback,
+        tick_rate: TickRate | None = None,
     ) -> None:
         self.steps = 0
         """Control steps made."""
@@ -64,6 +72,8 @@ class HilSession:
         self._say = say
         self._reader = TickReader(instance)
         self._feedback = feedback
+        self._tick_rate = tick_rate
+        self._plain_tick: PlainTick | None = None
         self._instance = instance
         self._out: list[bytes] = []
         self._last_time = 0
@@ -87,6 +97,8 @@ class HilSession:
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the plant; the answer is in `to_send`."""
+        if self._plain_tick is not None and self._answer_plainly(self._plain_tick, datagram, now):
+            return
         tick = self._reader.read(datagram)
         for frame in tick.others:
             self._autopilot.hear(frame, now)
@@ -99,16 +111,42 @@ class HilSession:
         elif tick.time_usec > self._last_time or self._last_heard is None:
             if tick.time_usec <= self._last_time:
                 self._say("the plant has started again")
-                self._autopilot.disarm()
+                self._disarm()
                 self._feedback.restart()
+                if self._tick_rate is not None:
+                    self._tick_rate.restart()
             self._answer(tick.time_usec, tick, now)
         else:
             return  # overtaken by a newer tick
         self._last_heard = now
 
+    def _answer_plainly(self, plain_tick: PlainTick, datagram: bytes, now: float) -> bool:
+        """Answer in one compiled call; False: there is more to this datagram, nothing was done."""
+        reader, packer, length = self._reader, self._packer, len(datagram)
+        reader.view[:length] = datagram
+        size = plain_tick(length, *reader.systems, self._last_time, packer.sequence)
+        if size == 0:
+            return False
+        packer.next_sequence()
+        self.steps += 1
+        self._last_time = reader.time_usec
+        self._last_answer = bytes(self._writer.view[:size])
+        self._out.append(self._last_answer)
+        self._last_heard = now
+        return True
+
+    def _bound_plain_tick(self) -> PlainTick | None:
+        """The compiled tick, where there is no more to a tick than truth and law."""
+        law = self._autopilot.law
+        if law is None or not self._feedback.plain:
+            return None
+        reader, writer = self._reader, self._writer
+        return answer_truth.bind(*reader.buffers, *law, writer.controls, *writer.buffers)
+
     def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
+        at_our_rate = self._tick_rate is None or self._tick_rate.fits(time_usec)
         estimate = self._feedback.take(time_usec, tick, self._reader)
-        if estimate is not None:
+        if estimate is not None and at_our_rate:
             before = self._autopilot.armed
             self._autopilot.step(estimate, time_usec, now)
             if self._autopilot.armed != before:
@@ -117,14 +155,20 @@ class HilSession:
                 )
             self._feedback.flown(self._writer.controls)
             self.steps += 1
+            if self._plain_tick is None:
+                self._plain_tick = self._bound_plain_tick()
         else:
-            self._autopilot.disarm()
-            if self._feedback.needs_truth and now >= self._next_request:
+            self._disarm()
+            if estimate is None and self._feedback.needs_truth and now >= self._next_request:
                 self._next_request = now + REQUEST_INTERVAL
                 self._request(ODOMETRY.message_id, 0.0)
         self._last_time = time_usec
         self._last_answer = self._writer.answer(time_usec, self._autopilot.armed)
         self._out.append(self._last_answer)
+
+    def _disarm(self) -> None:
+        self._autopilot.disarm()
+        self._plain_tick = None
 
     def _connect(self) -> None:
         """What PX4 says on connecting: a heartbeat, and a request for the simulator's state."""
@@ -163,10 +207,20 @@ def new_session(
     instance: int,
     say: Callable[[str], None],
     feedback: Feedback | None = None,
+    rate_hz: float | None = None,
 ) -> HilSession:
-    """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,)."""
+    """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,).
+
+    rate_hz: that the autopilot was designed for; None: it flies at any.
+    """
     packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
     writer = AnswerWriter(instance, packer)
     return HilSession(
-        make_autopilot(writer.controls), writer, packer, instance, say, feedback or TruthFeedback()
+        make_autopilot(writer.controls),
+        writer,
+        packer,
+        instance,
+        say,
+        feedback or TruthFeedback(),
+        None if rate_hz is None else TickRate(rate_hz, say),
     )

@@ -181,18 +181,26 @@ class TickReader:
         """State (18,) of the latest truth, eq. 31, ENU and FLU."""
         self.sensed = np.zeros(1, dtype=SENSED)
         """The latest tick's record of SENSED, shape (1,)."""
-        self._systems = (vehicle_system(instance), load_system(instance))
+        self.systems = (vehicle_system(instance), load_system(instance))
+        """System ids of vehicle and load."""
         data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
-        self._header = np.zeros(2, dtype=np.int64)
-        self._view = data.data
+        header = np.zeros(2, dtype=np.int64)
+        self.view = data.data
+        """Where a datagram is put to be read."""
+        self._header = header.data  # numbers come faster out of a memoryview
         records = np.zeros(1, dtype=INCOMING)
         payloads = records.view(np.uint8)
         self.gps = records[0]["gps"]
         """The latest HIL_GPS, a record as on the wire."""
-        self._read = read_tick.bind(
-            data, self._table, records, payloads, self.estimate, self.sensed, self._header
-        )
+        self.buffers = (data, self._table, records, payloads, self.estimate, self.sensed, header)
+        """The arrays of `read_tick`."""
+        self._read = read_tick.bind(*self.buffers)
+
+    @property
+    def time_usec(self) -> int:
+        """Of the latest HIL_SENSOR."""
+        return self._header[1]
 
     @property
     def begun(self) -> bool:
@@ -202,12 +210,12 @@ class TickReader:
     def read(self, datagram: bytes) -> Tick:
         """Everything in a datagram (at most 65536 bytes)."""
         length = len(datagram)
-        self._view[:length] = datagram
-        found = self._read(length, *self._systems)
+        self.view[:length] = datagram
+        found = self._read(length, *self.systems)
         others: list[Frame] = []
         if found & OTHERS:
             rows = self._table[: self._header[0]].tolist()
             known = (_SENSOR_ID, _GPS_ID, _ODOMETRY_ID, _STATE_ID)
             others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] not in known]
         truth = bool(found & VEHICLE_TRUTH and found & LOAD_TRUTH)
-        return Tick(int(self._header[1]) if found & TICK else None, truth, bool(found & GPS), others)
+        return Tick(self.time_usec if found & TICK else None, truth, bool(found & GPS), others)

@@ -87,6 +87,7 @@ class UdpLink:
             if self._fixed:
                 self._peer = (socket.gethostbyname(address.host), address.port)
                 self._socket.bind(("127.0.0.1" if self._peer[0].startswith("127.") else "", 0))
+                self._socket.connect(self._peer)  # nobody else is heard, and sending looks up no route
             else:
                 self._socket.bind((address.host, address.port))
         except OSError as error:
@@ -105,30 +106,30 @@ class UdpLink:
 
     def send(self, datagram: bytes) -> None:
         """Send to the peer; what the system cannot deliver is lost, as on any network."""
-        if self._peer is not None:
-            try:
+        try:
+            if self._fixed:
+                self._socket.send(datagram)
+            elif self._peer is not None:
                 self._socket.sendto(datagram, self._peer)
-            except OSError:
-                return
+        except OSError:
+            return
 
     def receive(self, until: float) -> bytes | None:
         """The next datagram, or None when `time.monotonic()` reaches `until` first."""
-        wait = min(until - time.monotonic(), LONGEST_WAIT)
+        wait = until - time.monotonic()
+        flags = 0
+        if self._punctual or wait <= 0.0:
+            flags = int(socket.MSG_DONTWAIT)
+            if wait > 0.0 and not select.select([self._socket], [], [], min(wait, LONGEST_WAIT))[0]:
+                return None
+        elif not self._timeout - COARSE_WAIT < wait <= self._timeout:
+            self._set_timeout(min(wait, LONGEST_WAIT))
         try:
-            if self._punctual and wait > 0.0:
-                if not select.select([self._socket], [], [], wait)[0]:
-                    return None
-                flags = int(socket.MSG_DONTWAIT)
-            elif wait > 0.0:
-                self._set_timeout(wait)
-                flags = 0
-            else:
-                flags = int(socket.MSG_DONTWAIT)
-            datagram, sender = self._socket.recvfrom(LARGEST_DATAGRAM, flags)
+            if self._fixed:
+                return self._socket.recv(LARGEST_DATAGRAM, flags)
+            datagram, self._peer = self._socket.recvfrom(LARGEST_DATAGRAM, flags)
         except OSError:  # nothing came, or an earlier datagram could not be delivered
             return None
-        if not self._fixed:
-            self._peer = sender
         return datagram
 
     def _set_timeout(self, wait: float) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import math
+from typing import Any
 
 import numpy as np
 
@@ -29,8 +30,8 @@ from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS, MODE_FLAG_ARMED
 _ANSWER_ID = HIL_ACTUATOR_CONTROLS.message_id
 _PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
 
-# What `read_answer` found, as bits; the system of a foreign answer comes in the next byte.
-ANSWERED, OTHERS, FOREIGN, JUNK = 1, 2, 4, 8
+# What `read_answer` found, as bits; the system of a foreign answer comes in the byte above them.
+ANSWERED, ARMED, NOT_FINITE, OTHERS, FOREIGN, JUNK = 1, 2, 4, 8, 16, 32
 _FOREIGN_SHIFT = 8
 
 
@@ -40,7 +41,7 @@ _FOREIGN_SHIFT = 8
     Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
     Buffer(np.uint8, (_PAYLOAD_SIZE,)),
     Buffer(np.float64, (ACTUATOR_CONTROLS,)),
-    Buffer(np.int64, (3,)),
+    Buffer(np.int64, (2,)),
     int,
     int,
 )
@@ -56,7 +57,7 @@ def read_answer(
 ) -> int:
     """Find the last HIL_ACTUATOR_CONTROLS of `system` in data[:length]; returns bits of what was found.
 
-    header: number of frames, then time_usec and mode of the answer; controls (16,): the answer's.
+    header: number of frames, time_usec of the answer; controls (16,): the answer's.
     """
     count = scan(data, table, length)
     header[0] = count
@@ -77,55 +78,51 @@ def read_answer(
         record = records[0]
         for i in range(ACTUATOR_CONTROLS):
             controls[i] = record.controls[i]
+            if not math.isfinite(controls[i]):
+                found |= NOT_FINITE
         header[1] = record.time_usec
-        header[2] = record.mode
+        if record.mode & MODE_FLAG_ARMED:
+            found |= ARMED
     return found
-
-
-class Answer(NamedTuple):
-    """One HIL_ACTUATOR_CONTROLS."""
-
-    time_usec: int
-    controls: list[float]
-    """16 controls, 0..1 for a rotor; possibly not finite."""
-    armed: bool
-
-
-class Received(NamedTuple):
-    """What a datagram from the autopilot held."""
-
-    answer: Answer | None
-    others: list[Frame]
-    foreign_system: int | None
-    """System id of an answer that is not from this instance's autopilot."""
-    junk: bool
 
 
 class AnswerReader:
     """Reads datagrams from the autopilot of one instance."""
 
     def __init__(self, instance: int) -> None:
-        self._system = vehicle_system(instance)
-        self._data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
+        self.controls = np.zeros(ACTUATOR_CONTROLS)
+        """Of the latest answer, 0..1 for a rotor; possibly not finite."""
+        self.system = vehicle_system(instance)
+        """System id of the autopilot."""
+        data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
         self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
+        header = np.zeros(2, dtype=np.int64)
         record, payload = HIL_ACTUATOR_CONTROLS.record()
-        self._controls = np.zeros(ACTUATOR_CONTROLS)
-        self._header = np.zeros(3, dtype=np.int64)
-        self._view = self._data.data
-        self._read = read_answer.bind(self._data, self._table, record, payload, self._controls, self._header)
+        self.view = data.data
+        """Where a datagram is put to be read."""
+        self._header = header.data  # numbers come faster out of a memoryview
+        self.arrays = (data, self._table, record, payload, self.controls, header)
+        """The array arguments of `read_answer`."""
+        self._read = read_answer.bind(*self.arrays)
 
-    def read(self, datagram: bytes) -> Received:
-        """Everything in a datagram (at most 65536 bytes)."""
+    @property
+    def time_usec(self) -> int:
+        """Of the tick that the latest answer is for."""
+        return self._header[1]
+
+    def read(self, datagram: bytes) -> int:
+        """Look through a datagram (at most 65536 bytes); returns bits of what it holds."""
         length = len(datagram)
-        self._view[:length] = datagram
-        found = self._read(length, self._system)
-        answer = None
-        if found & ANSWERED:
-            _, time_usec, mode = self._header.tolist()
-            answer = Answer(time_usec, self._controls.tolist(), bool(mode & MODE_FLAG_ARMED))
-        others: list[Frame] = []
-        if found & OTHERS:
-            rows = self._table[: self._header[0]].tolist()
-            others = [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] != _ANSWER_ID]
-        foreign = found >> _FOREIGN_SHIFT if found & FOREIGN else None
-        return Received(answer, others, foreign, bool(found & JUNK))
+        self.view[:length] = datagram
+        found: int = self._read(length, self.system)
+        return found
+
+    def others(self, datagram: bytes) -> list[Frame]:
+        """The frames of the datagram just read that are no answers."""
+        rows = self._table[: self._header[0]].tolist()
+        return [frame_at(datagram, row) for row in rows if row[MESSAGE_ID] != _ANSWER_ID]
+
+
+def foreign_system(found: int) -> int:
+    """System id of an answer that is not from this instance's autopilot."""
+    return found >> _FOREIGN_SHIFT

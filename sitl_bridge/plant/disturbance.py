@@ -25,36 +25,32 @@ class HeldTable(ABC):
         """The row that acts now."""
         self.next_step = 0
         """Number of the next step, counted from row 0."""
-        self.constant = True
-        """Whether nothing ever changes, so that the table need not be drawn again."""
-
-    @property
-    def steps_left(self) -> int:
+        self.steps_left = 0
         """How many steps the table still covers."""
-        return TABLE_ROWS * self.hold_steps - self.next_step
+        self.constant = True
+        """Whether nothing ever changes: row 0 acts for good, and there is no need to count."""
 
     def begin(self) -> None:
         """Start from a fresh table."""
         self.next_step = 0
-        self._fill()
+        self.steps_left = TABLE_ROWS * self.hold_steps
+        self.draw()
+        self.now[:] = self.table[0]
 
     def advance(self, steps: int) -> None:
-        """So many steps were taken."""
+        """So many steps were taken, at most as many as were left."""
+        if self.constant:
+            return
         self.next_step += steps
+        self.steps_left -= steps
         if self.steps_left == 0:
-            self.next_step = 0
-            if not self.constant:
-                self._fill()
-        elif not self.constant:
+            self.begin()
+        else:
             self.now[:] = self.table[self.next_step // self.hold_steps]
 
     @abstractmethod
     def draw(self) -> None:
         """Fill the whole table."""
-
-    def _fill(self) -> None:
-        self.draw()
-        self.now[:] = self.table[0]
 
 
 class HeldForce(HeldTable):

@@ -4,9 +4,24 @@ from __future__ import annotations
 
 import math
 
-from sitl_bridge.plant.answers import Answer, AnswerReader
+import numpy as np
+
+from sitl_bridge.ids import ACTUATOR_CONTROLS
+from sitl_bridge.plant.answers import (
+    ANSWERED,
+    ARMED,
+    FOREIGN,
+    JUNK,
+    NOT_FINITE,
+    OTHERS,
+    foreign_system,
+)
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.state import Array
+
+STOPPED = np.zeros(ACTUATOR_CONTROLS)
+"""Controls of rotors at rest."""
 
 
 class HilReceiver:
@@ -15,29 +30,45 @@ class HilReceiver:
     def __init__(self, simulation: Simulation, notices: Notices, instance: int) -> None:
         self.replies: list[bytes] = []
         """Datagrams to send back."""
+        self.armed = False
+        """Of the latest answer, likewise the next two."""
+        self.controls: Array = STOPPED
+        """(16,), 0..1 for a rotor; changed by the next answer."""
+        self.time_usec = 0
         self._simulation = simulation
         self._notices = notices
         self._instance = instance
-        self._reader = AnswerReader(instance)
+        self._reader = simulation.answers
 
-    def receive(self, datagram: bytes) -> Answer | None:
-        """The answer in a datagram, if there is one."""
-        received = self._reader.read(datagram)
-        if received.foreign_system is not None:
+    def receive(self, datagram: bytes) -> bool:
+        """Take a datagram; returns whether it held an answer."""
+        found = self._reader.read(datagram)
+        if found & ~(ANSWERED | ARMED):
+            self._look_closer(found, datagram)
+        if not found & ANSWERED:
+            return False
+        self.time_usec = self._reader.time_usec
+        self.armed = bool(found & ARMED)
+        self.controls = self._reader.controls if self.armed else STOPPED
+        return True
+
+    def _look_closer(self, found: int, datagram: bytes) -> None:
+        """What there is besides a good answer."""
+        if found & FOREIGN:
             self._notices.once(
                 "foreign",
-                f"HIL_ACTUATOR_CONTROLS from system {received.foreign_system} ignored: expected system "
+                f"HIL_ACTUATOR_CONTROLS from system {foreign_system(found)} ignored: expected system "
                 f"{self._instance + 1} (is the autopilot another --instance?)",
             )
-        if received.junk:
+        if found & JUNK:
             self._notices.once(
                 "junk", f"{len(datagram)} bytes on the HIL link that are not MAVLink `common` frames: ignored"
             )
-        for frame in received.others:
-            if reply := self._simulation.handle(frame):
-                self.replies.append(reply)
-        answer = received.answer
-        if answer is not None and not all(map(math.isfinite, answer.controls)):
-            which = [i for i, value in enumerate(answer.controls) if not math.isfinite(value)]
+        if found & OTHERS:
+            for frame in self._reader.others(datagram):
+                if reply := self._simulation.handle(frame):
+                    self.replies.append(reply)
+        if found & NOT_FINITE:
+            controls = self._reader.controls.tolist()
+            which = [i for i, value in enumerate(controls) if not math.isfinite(value)]
             self._notices.once("not finite", f"controls {which} are not finite numbers: those rotors stop")
-        return answer

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from sitl_bridge.plant.answers import Answer
 from sitl_bridge.plant.link import HilReceiver
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.state import Array
 
 SHORTEST_TIMEOUT = 0.005
 """First wait for an answer before a tick is sent again, s; it grows with the answers' usual delay."""
@@ -58,7 +58,7 @@ class Lockstep:
         self._first_sent_at = 0.0
         self._repeats = -1  # of the current tick; -1: not sent yet
         self._usual_delay = SHORTEST_TIMEOUT / 4
-        self._last_controls: list[float] | None = None
+        self._last_controls: Array | None = None  # kept only to fly on with
 
     @property
     def finished(self) -> bool:
@@ -84,32 +84,38 @@ class Lockstep:
             self._freewheel(now)
         elif self._repeats >= 0:
             self._repeat(now)
-        if self.finished:
+        if self.simulation.finished:
             return out
-        if self._repeats < 0:
-            self._first_sent_at = now
-        self._sent_at = now
         self._repeats += 1
+        self._sent_at = now
+        if self._repeats == 0:
+            self._first_sent_at = now
         if self._locked:
             self._due = now + self._timeout()
             if self._repeats > 0 and not self._resend:
                 return out
-        return [*out, self.simulation.datagram()]
+        return [*out, self.simulation.datagram()] if out else [self.simulation.datagram()]
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the autopilot."""
-        answer = self._receiver.receive(datagram)
-        if answer is None:
+        if self._repeats == 0 and self._on_silence == "wait" and self.simulation.exchange(datagram):
+            self._answered(now)
+            return
+        answer = self._receiver
+        if not answer.receive(datagram):
             return
         if not self._locked:
             self._lock(now)
         if self._repeats < 0 or answer.time_usec != self.simulation.time_usec:
             return  # a duplicate, or an answer that comes too late to matter
-        if self._repeats == 0:  # an answer to a repeated tick may belong to any of its sendings
-            self._usual_delay += 0.125 * (now - self._sent_at - self._usual_delay)
-        if self._notices.clear("silence"):
-            self._notices.now("autopilot answers again")
-        self._fly(answer, now)
+        if self._repeats > 0:
+            self._notices.over("silence", "autopilot answers again")
+        if self._on_silence == "continue":
+            self._last_controls = answer.controls.copy()
+        if answer.armed and not self.simulation.started:
+            self.simulation.begin()
+        self._advance(answer.controls)
+        self._answered(now)
 
     def _freewheel(self, now: float) -> None:
         """Until the first answer: time runs at the nominal pace, the vehicle is held."""
@@ -129,7 +135,7 @@ class Lockstep:
         silence = self._repeats >= REPEATS_BEFORE_NOTICE
         if silence and self._on_silence == "continue" and self._last_controls is not None:
             self.unanswered_ticks += 1
-            self._advance(self._last_controls, now)
+            self._advance(self._last_controls)
             self._repeats = -1
             return
         if silence and now - self._first_sent_at >= SILENCE_BEFORE_NOTICE:
@@ -139,23 +145,22 @@ class Lockstep:
 
     def _timeout(self) -> float:
         patience = max(SHORTEST_TIMEOUT, 4.0 * self._usual_delay)
-        return min(LONGEST_TIMEOUT, patience * 2.0 ** max(0, min(self._repeats, 16)))
+        if self._repeats > 0:
+            patience *= 2.0 ** min(self._repeats, 16)
+        return min(LONGEST_TIMEOUT, patience)
 
-    def _fly(self, answer: Answer, now: float) -> None:
-        self._last_controls = answer.controls
-        if answer.armed and not self.simulation.started:
-            self.simulation.begin()
-        controls = answer.controls if answer.armed else [0.0] * len(answer.controls)
-        self._advance(controls, now)
-
-    def _advance(self, controls: list[float], now: float) -> None:
+    def _advance(self, controls: Array) -> None:
         if self.simulation.started:
             self.simulation.step(controls)
         else:
             self.simulation.next_tick()
+
+    def _answered(self, now: float) -> None:
+        """The current tick is over, the next is due."""
+        if self._repeats == 0:  # an answer to a repeated tick may belong to any of its sendings
+            self._usual_delay += 0.125 * (now - self._sent_at - self._usual_delay)
         self._repeats = -1
-        if self._pace is None:
-            self._due = now
-        else:
+        self._due = now
+        if self._pace is not None:
             self._not_before = max(self._not_before + self._pace, now - self._pace)
             self._due = max(self._not_before, now)

@@ -72,6 +72,33 @@ VEHICLE_SEQUENCE, LOAD_SEQUENCE, VEHICLE_SYSTEM, LOAD_SYSTEM = range(4)
 
 
 @kernel
+def is_due(pace: Array, time_usec: int) -> bool:
+    """Whether a message goes out at this tick, to be asked once a tick; see `Paced` for pace (2,)."""
+    if time_usec < pace[1]:
+        return False
+    pace[1] = max(pace[1] + pace[0], time_usec)
+    return True
+
+
+class Paced:
+    """A message that goes out at an interval, on average, as near as ticks allow.
+
+    `pace`: the interval and when it is due next, us.
+    """
+
+    def __init__(self) -> None:
+        self.pace = np.array([0.0, math.inf])
+
+    def every(self, interval_us: float) -> None:
+        """As SET_MESSAGE_INTERVAL has it: microseconds; 0: at every tick; negative: never."""
+        self.pace[:] = (interval_us, math.inf if interval_us < 0 else 0.0)
+
+    def due(self, time_usec: int) -> bool:
+        """Whether it goes out at this tick; to be asked once a tick."""
+        return bool(is_due(self.pace, time_usec))
+
+
+@kernel
 def fill_sensor(out: Any, measured: Any) -> None:
     """HIL_SENSOR from measurements in SI units and body FLU."""
     a, g, m = measured.accelerometer, measured.gyroscope, measured.magnetometer
@@ -236,17 +263,27 @@ class TickWriter:
         payloads = self._records.view(np.uint8)
         geodesy = np.array([*origin.home, *origin.degrees_per_metre])
         self._write = write_tick.bind(self._records, payloads, *world.sensed(), geodesy, counters, self._out)
+        self.state = Paced()
+        """When HIL_STATE_QUATERNION goes out."""
+        self.arrays = (self._records, payloads, geodesy, counters, self.state.pace, self._out)
+        """What `tick.exchange` needs of the writer, in its order, as it changes."""
         self.vehicle = CountedPacker(vehicle_system(instance), COMPONENT_TRUTH, counters, VEHICLE_SEQUENCE)
         """Packs other frames of the plant about the vehicle."""
         self.load = CountedPacker(load_system(instance), COMPONENT_LOAD, counters, LOAD_SEQUENCE)
         """Packs other frames of the load."""
 
     def datagram(self, time_usec: int, gps: GpsFix | None, wanted: int) -> bytes:
-        """The frames of a tick: HIL_GPS when there is a fix, what is wanted (TRUTH, STATE), HIL_SENSOR."""
+        """The frames of a tick: HIL_GPS when there is a fix, HIL_STATE_QUATERNION when it is due, what is
+        wanted (TRUTH or 0), HIL_SENSOR."""
         if gps is not None:
             self._fill_gps(time_usec, gps)
             wanted |= GPS
-        length = self._write(time_usec, wanted)
+        if self.state.due(time_usec):
+            wanted |= STATE
+        return self.written(self._write(time_usec, wanted))
+
+    def written(self, length: int) -> bytes:
+        """The datagram of this length that was written last."""
         return bytes(self._view[:length])
 
     def _fill_gps(self, time_usec: int, fix: GpsFix) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class Notices:
-    """Says each kind of thing once; `clear` lets it be said again."""
+    """Says each kind of thing once; `over` lets it be said again."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -18,13 +18,8 @@ class Notices:
             self._said.add(kind)
             self._say(text)
 
-    def clear(self, kind: str) -> bool:
-        """The cause is gone; returns whether it had been said."""
+    def over(self, kind: str, text: str) -> None:
+        """The cause is gone: say `text` if it had been said, and let it be said again."""
         if kind in self._said:
             self._said.discard(kind)
-            return True
-        return False
-
-    def now(self, text: str) -> None:
-        """Say `text` in any case."""
-        self._say(text)
+            self._say(text)

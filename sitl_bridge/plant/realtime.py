@@ -9,15 +9,13 @@ from __future__ import annotations
 
 from collections import deque
 
-from sitl_bridge.ids import ACTUATOR_CONTROLS
-from sitl_bridge.plant.link import HilReceiver
+from sitl_bridge.plant.link import STOPPED, HilReceiver
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.state import Array
 
 AUTOPILOT_TIMEOUT = 0.3
 """Silence after which the rotors stop, s."""
-
-STOPPED = [0.0] * ACTUATOR_CONTROLS
 
 
 class Realtime:
@@ -33,7 +31,7 @@ class Realtime:
         self._notices = notices
         self._deadline = 0.0  # of the next tick
         self._tick_began = 0.0  # deadline of the current tick
-        self._pending: deque[tuple[float, list[float]]] = deque()  # (when it acts, controls)
+        self._pending: deque[tuple[float, Array]] = deque()  # (when it acts, controls)
         self._last_answer: float | None = None
         self._last_time_usec = 0
         self._sent = False
@@ -55,22 +53,20 @@ class Realtime:
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the autopilot; its command takes effect now."""
-        answer = self._receiver.receive(datagram)
-        if answer is None or answer.time_usec < self._last_time_usec:
+        answer = self._receiver
+        if not answer.receive(datagram) or answer.time_usec < self._last_time_usec:
             return  # nothing, or an answer that a newer one has overtaken
         if answer.time_usec > self.simulation.time_usec:
             self._notices.once("future", "an answer to a tick that has not happened yet: ignored")
             return
         self._last_time_usec = answer.time_usec
         self.simulation.heard()
-        if self._notices.clear("silence"):
-            self._notices.now("autopilot answers again")
+        self._notices.over("silence", "autopilot answers again")
         self._last_answer = now
-        controls = answer.controls if answer.armed else STOPPED
         if answer.armed and not self.simulation.started:
             self.simulation.begin()
         if self.simulation.started:
-            self._pending.append((now + self._loop_delay, controls))
+            self._pending.append((now + self._loop_delay, answer.controls.copy()))
 
     def to_send(self, now: float) -> list[bytes]:
         """Datagrams that are due: fly the tick that is over, begin the next."""

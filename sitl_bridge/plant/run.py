@@ -55,7 +55,8 @@ class Progress:
 
     def __init__(self, speaker: Speaker) -> None:
         self._speaker = speaker
-        self._next = 0.0
+        self.due = 0.0
+        """When there is something to report, of `time.monotonic()`."""
         self.began_at: float | None = None
 
     def begin(self) -> None:
@@ -66,9 +67,9 @@ class Progress:
 
     def report(self, now: float, simulation: Simulation) -> None:
         """Say how far the scenario is, from time to time."""
-        if now < self._next or self.began_at is None:
+        self.due = now + REPORT_INTERVAL
+        if self.began_at is None:
             return
-        self._next = now + REPORT_INTERVAL
         load = simulation.world.state[LOAD_POSITION].tolist()
         self._speaker.event(
             "progress", time_s=simulation.scenario_time, load_m=load, real_time_factor=self.factor(simulation)
@@ -99,7 +100,8 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
     log, tlog = None, None
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
-        log = simulation.recorder = StateLog(options.out / FILE_NAME, simulation.world)
+        log = StateLog(options.out / FILE_NAME, simulation.world)
+        simulation.record_with(log)
         tlog = TlogWriter(options.out / TLOG_NAME)
     punctual = options.clock == "realtime" or bool(options.faults.link)
     link = open_link(options.hil, speaker.say, punctual)
@@ -167,22 +169,24 @@ def _loop(
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     epoch = time.time() - time.monotonic()
-    clock.start(time.monotonic())
-    while not clock.finished and not stop:
-        now = time.monotonic()
+    simulation = clock.simulation
+    now = time.monotonic()
+    clock.start(now)
+    while not simulation.finished and stop.reason is None:
         for datagram in clock.to_send(now):
             link.send(datagram)
             if tlog is not None:
                 tlog.write(datagram, epoch + now)
         received = link.receive(clock.next_deadline())
+        now = time.monotonic()
         if received is not None:
-            now = time.monotonic()
             clock.receive(received, now)
             if tlog is not None:
                 tlog.write(received, epoch + now)
-        progress.report(now, clock.simulation)
+        if now >= progress.due:
+            progress.report(now, simulation)
         if station is not None:
-            station.show(now, clock.simulation)
+            station.show(now, simulation)
 
 
 def _outcome(

@@ -5,18 +5,24 @@ The clock (`lockstep`, `realtime`) decides when a tick happens; this decides wha
 
 from __future__ import annotations
 
+import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Protocol
 
+import numpy as np
 from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, decode
 from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
+from sitl_bridge.plant.answers import AnswerReader
 from sitl_bridge.plant.faults import Faults, from_command, timeline, with_gusts
-from sitl_bridge.plant.messages import STATE, TRUTH, TickWriter
+from sitl_bridge.plant.messages import TRUTH, TickWriter
+from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH
 from sitl_bridge.plant.slow_frames import LoadOnMap, SlowFrames
+from sitl_bridge.plant.state import Array
+from sitl_bridge.plant.tick import exchange
 from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
@@ -24,33 +30,26 @@ from sitl_bridge.vehicle import Vehicle
 class Recorder(Protocol):
     """Takes the state of each tick of the scenario."""
 
+    @property
+    def table(self) -> Array | None:
+        """Rows as in `rows` (CHUNK_ROWS, WIDTH), where a tick may fill in the next itself; None: there are
+        none, call `record`."""
+
+    @property
+    def count(self) -> int:
+        """Number of the next row in `table`."""
+
     def record(self, time_s: float, world: World) -> None:
         """Keep the world as it is at scenario time `time_s`, with the rotors as commanded from now on."""
 
+    def took_row(self) -> None:
+        """The next row is filled in."""
+
 
 NO_FAULTS = Faults()
+_FAULT_GRAIN = 1e-9  # s; a fault at a tick's time happens at that tick, rounding or not
 BATTERY_STEP = 0.04
 """So often the battery is drawn on, s: its charge needs no tick."""
-
-
-class Paced:
-    """A message that goes out at an interval, on average, as near as ticks allow."""
-
-    def __init__(self) -> None:
-        self._interval: float | None = None
-        self._due = 0.0
-
-    def every(self, interval_us: float) -> None:
-        """As SET_MESSAGE_INTERVAL has it: microseconds; 0: at every tick; negative: never."""
-        self._interval = None if interval_us < 0 else interval_us
-        self._due = 0.0
-
-    def due(self, time_usec: int) -> bool:
-        """Whether it goes out at this tick; to be asked once a tick."""
-        if self._interval is None or time_usec < self._due:
-            return False
-        self._due = max(self._due + self._interval, time_usec)
-        return True
 
 
 class Simulation:
@@ -73,14 +72,18 @@ class Simulation:
         self._faults = timeline(faults)
         self._faults_done = 0
         self.tick = 0
-        """Number of the current tick; its `time_usec` is that of tick_time(tick)."""
+        """Number of the current tick."""
+        self.time_usec = 0
+        """`time_usec` of the current tick: above 0, and only growing."""
+        self.finished = False
+        """Whether the scenario's duration is over."""
         self.ticks_flown = 0
         """Ticks of the scenario that are over."""
         self.started = False
         """Whether the scenario has begun."""
-        self._last_tick = None if duration_s is None else round(duration_s * rate_hz)
+        self._last_tick = None if duration_s is None else max(1, round(duration_s * rate_hz))
         self._vehicle = vehicle
-        self.recorder = recorder
+        self._delay_ticks = vehicle.loop.delay_ticks
         self._on_begin = on_begin
         self._first_sensed = 0
         self._sensors_due = False
@@ -88,6 +91,8 @@ class Simulation:
         self._heard = False
         home = vehicle.home
         self.origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
+        self.answers = AnswerReader(instance)
+        """Reads what the autopilot says."""
         self._writer = TickWriter(instance, self.origin, self.world)
         self._slow = SlowFrames(
             LoadOnMap(instance, self.origin),
@@ -98,24 +103,27 @@ class Simulation:
         )
         self._power = self.world.battery(0.0)
         self._battery_every = max(1, round(BATTERY_STEP * rate_hz))
-        self._state = Paced()
-        self._under_way: deque[Sequence[float]] = deque()
+        self._under_way: deque[Array] = deque()
+        self.record_with(recorder)
         self._datagram: bytes | None = None
+        self._ticks_left = 0  # on which nothing is due but what `exchange` does
+        self._go_to_tick(0)
 
-    @property
-    def time_usec(self) -> int:
-        """`time_usec` of the current tick: above 0, and only growing."""
-        return round((self.tick + 1) * MICROSECONDS_PER_SECOND / self.rate_hz)
+    def record_with(self, recorder: Recorder | None) -> None:
+        """Have the states of the scenario kept from now on."""
+        self._recorder = recorder
+        table = None if recorder is None else recorder.table
+        self._exchange = exchange.bind(
+            *self.answers.arrays,
+            *self.world.arrays(),
+            np.zeros((CHUNK_ROWS, WIDTH)) if table is None else table,
+            *self._writer.arrays,
+        )
 
     @property
     def scenario_time(self) -> float:
         """Seconds since the scenario began."""
         return self.ticks_flown / self.rate_hz
-
-    @property
-    def finished(self) -> bool:
-        """Whether the scenario's duration is over."""
-        return self._last_tick is not None and self.ticks_flown >= self._last_tick
 
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for."""
@@ -130,9 +138,8 @@ class Simulation:
             seen = None if world.tracker is None else world.tracker.sample(tick, world.state)
             slow = self._slow.frames(tick, time_usec, world.state, self._power, seen)
             wanted = TRUTH if self._truth and self._heard else 0
-            if self._state.due(time_usec):
-                wanted |= STATE
             self._datagram = slow + self._writer.datagram(time_usec, fix, wanted)
+            self._ticks_left = self._count_ticks_left() if self.started else 0
         return self._datagram
 
     def heard(self) -> None:
@@ -165,9 +172,10 @@ class Simulation:
         if self._sensors_due:
             self._begin_sensing()
         self.started = True
+        self._ticks_left = 0
         self._under_way.clear()
-        for _ in range(self._vehicle.loop.delay_ticks):
-            self._under_way.append(self.world.trim_controls)
+        for _ in range(self._delay_ticks):
+            self._under_way.append(np.array(self.world.trim_controls))
         self._faults_done = 0
         self._power = self.world.battery(0.0)
         self._apply_faults()
@@ -175,39 +183,97 @@ class Simulation:
 
     def next_tick(self) -> None:
         """Go on to the next tick while the vehicle is held."""
-        self.tick += 1
+        self._go_to_tick(self.tick + 1)
+
+    def _go_to_tick(self, tick: int) -> None:
+        self.tick = tick
+        self.time_usec = self._time_usec(tick)
         self._datagram = None
 
-    def step(self, controls: Sequence[float]) -> None:
-        """Fly one tick under the controls that answer it (later by the loop's delay)."""
-        if self._vehicle.loop.delay_ticks:
-            self._under_way.append(controls)
+    def _time_usec(self, tick: int) -> int:
+        return round((tick + 1) * MICROSECONDS_PER_SECOND / self.rate_hz)
+
+    def step(self, controls: Array) -> None:
+        """Fly one tick under the controls (16,) that answer it (later by the loop's delay)."""
+        if self._delay_ticks:
+            self._under_way.append(controls.copy())
             controls = self._under_way.popleft()
         self.world.command(controls)
         self.record()
         self.world.advance(self.world.steps_per_tick)
         self.finish_tick()
 
+    def exchange(self, datagram: bytes) -> bool:
+        """Fly the current tick and have the next one's frames ready, in one go: True.
+
+        Only if the datagram is the armed answer to the tick and nothing else is due; where this returns False
+        nothing has happened, and the datagram is to be taken apart.
+        """
+        if self._ticks_left <= 0:
+            return False
+        answers, recorder, tick, length = self.answers, self._recorder, self.tick + 1, len(datagram)
+        answers.view[:length] = datagram
+        next_time_usec = self._time_usec(tick)
+        size = self._exchange(
+            length,
+            answers.system,
+            self.time_usec,
+            next_time_usec,
+            *self.world.next_steps(),
+            tick - self._first_sensed,
+            -1 if recorder is None else recorder.count,
+            TRUTH if self._truth else 0,
+            self.ticks_flown / self.rate_hz,
+        )
+        if size == 0:
+            return False
+        self.world.flown()
+        if recorder is not None:
+            recorder.took_row()
+        self.tick, self.time_usec = tick, next_time_usec
+        self.ticks_flown += 1
+        self._ticks_left -= 1
+        self._datagram = self._writer.written(size)
+        return True
+
+    def _count_ticks_left(self) -> int:
+        """For how many ticks from the current one on nothing is due but what `exchange` does."""
+        recorder = self._recorder
+        if self._delay_ticks or self._sensors_due or (recorder is not None and recorder.table is None):
+            return 0
+        sensed, flown = self.tick - self._first_sensed, self.ticks_flown
+        ticks = min(self.world.ticks_left(sensed), self._slow.ticks_left(sensed))
+        if self._power is not None:
+            ticks = min(ticks, self._battery_every - 1 - flown % self._battery_every)
+        if self._last_tick is not None:
+            ticks = min(ticks, self._last_tick - 1 - flown)
+        if self._faults_done < len(self._faults):
+            due = math.ceil((self._faults[self._faults_done].time - _FAULT_GRAIN) * self.rate_hz)
+            ticks = min(ticks, due - 1 - flown)
+        return ticks
+
     def record(self) -> None:
         """Record the world at the current tick, with the rotors as they are commanded now."""
-        if self.recorder is not None:
-            self.recorder.record(self.scenario_time, self.world)
+        if self._recorder is not None:
+            self._recorder.record(self.scenario_time, self.world)
 
     def finish_tick(self) -> None:
         """The tick is over: the next one is the current one; the scenario's last is recorded too."""
         self.ticks_flown += 1
         if self.ticks_flown % self._battery_every == 0:
             self._power = self.world.battery(self._battery_every * self.period)
-        self._apply_faults()
+        if self._faults:
+            self._apply_faults()
         self.next_tick()
-        if self.finished:
+        if self.ticks_flown == self._last_tick:
+            self.finished = True
             self.record()
 
     def _apply_faults(self) -> None:
         """Let happen what is due at this tick of the scenario."""
         while self._faults_done < len(self._faults):
             due = self._faults[self._faults_done]
-            if due.time > self.scenario_time + 1e-9:
+            if due.time > self.scenario_time + _FAULT_GRAIN:
                 break
             due.action.apply(self.world)
             self._faults_done += 1
@@ -233,7 +299,7 @@ class Simulation:
             command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL
             and command.param1 == HIL_STATE_QUATERNION.message_id
         ):
-            self._state.every(command.param2)
+            self._writer.state.every(command.param2)
         else:
             return None
         acknowledgement: Any = common.MAVLink_command_ack_message(

@@ -187,6 +187,11 @@ class SlowFrames:
             for interval in (HEARTBEAT_INTERVAL, POSITION_INTERVAL, BATTERY_INTERVAL)
         )
 
+    def ticks_left(self, tick: int) -> int:
+        """How many ticks after `tick` nothing is due (but sightings)."""
+        intervals = (self._heartbeat_every, self._position_every, self._battery_every)
+        return min(every - 1 - tick % every for every in intervals)
+
     def frames(
         self, tick: int, time_usec: int, x: Array, power: BatteryReading | None, seen: Sighting | None
     ) -> bytes:

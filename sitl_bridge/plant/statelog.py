@@ -3,67 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.plant.dynamics import pull_of
-from sitl_bridge.plant.parameters import PARAMETERS
-from sitl_bridge.plant.state import CABLE_HOLDS, COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
+from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH, columns, fill_row, kept_columns
 from sitl_bridge.plant.world import World
 from sitl_bridge.rowlog import RowLog
 
 FILE_NAME = "state.parquet"
-CHUNK_ROWS = 4096
-
-_TIME, _STATE, _LENGTH, _TENSION = 0, 1, 1 + STATE_SIZE, 2 + STATE_SIZE
-_ROTORS = _TENSION + 1
-_FORCE = _ROTORS + MOST_ROTORS
-_WIDTH = _FORCE + 6
-
-
-def columns(rotor_count: int) -> list[str]:
-    """Names of the log's columns, with their units."""
-    forces = [f"force_{body}_{axis}_N" for body in ("vehicle", "load") for axis in "xyz"]
-    rotors = [f"rotor_{i + 1}_rad_s" for i in range(rotor_count)]
-    return ["time_s", *COLUMNS, "cable_length_m", "cable_tension_N", *rotors, *forces]
-
-
-@entry_point(
-    Buffer(PARAMETERS, (1,)),
-    Buffer(np.float64, (STATE_SIZE,)),
-    Buffer(np.float64, (INNER_SIZE,)),
-    Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(np.float64, (6,)),
-    Buffer(np.float64, (CHUNK_ROWS, _WIDTH)),
-    int,
-    float,
-)
-def fill_row(
-    record: Any,
-    x: Array,
-    inner: Array,
-    command: Array,
-    force: Array,
-    rows: Array,
-    index: int,
-    time_s: float,
-) -> int:
-    """Write one row of the log. Rotors without lag have the speed that is commanded now."""
-    p, row = record[0], rows[index]
-    row[_TIME] = time_s
-    for i in range(STATE_SIZE):
-        row[_STATE + i] = x[i]
-    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
-    length = (ex * ex + ey * ey + ez * ez) ** 0.5
-    row[_LENGTH] = length
-    row[_TENSION] = pull_of(p, x) if inner[CABLE_HOLDS] > 0.0 else 0.0
-    for i in range(MOST_ROTORS):
-        row[_ROTORS + i] = inner[i] if p.time_constant[i] > 0.0 else command[i]
-    for i in range(6):
-        row[_FORCE + i] = force[i]
-    return index + 1
 
 
 class StateLog:
@@ -71,25 +18,31 @@ class StateLog:
 
     def __init__(self, path: Path, world: World) -> None:
         self.path = path
+        self.table = np.zeros((CHUNK_ROWS, WIDTH))
+        """Rows that are not written out yet; a compiled tick fills the next one itself, see `took_row`."""
+        self.count = 0
+        """How many there are; always fewer than fit."""
         self._log = RowLog(path, columns(len(world.vehicle.rotors)))
-        keep = [*range(_ROTORS + len(world.vehicle.rotors)), *range(_FORCE, _WIDTH)]
-        self._keep = np.array(keep)
-        self._rows = np.zeros((CHUNK_ROWS, _WIDTH))
-        self._fill = fill_row.bind(*world.log_sources(), self._rows)
-        self._count = 0
+        self._keep = kept_columns(len(world.vehicle.rotors))
+        self._fill = fill_row.bind(*world.log_sources(), self.table)
 
     def record(self, time_s: float, world: World) -> None:
         """Keep one row."""
-        self._count = self._fill(self._count, time_s)
-        if self._count == CHUNK_ROWS:
+        self._fill(self.count, time_s)
+        self.took_row()
+
+    def took_row(self) -> None:
+        """Row `count` of `table` is filled."""
+        self.count += 1
+        if self.count == CHUNK_ROWS:
             self._flush()
 
     def close(self) -> None:
         """Write out everything; raises what went wrong while writing."""
-        if self._count:
+        if self.count:
             self._flush()
         self._log.close()
 
     def _flush(self) -> None:
-        self._log.write(self._rows[: self._count, self._keep])
-        self._count = 0
+        self._log.write(self.table[: self.count, self._keep])
+        self.count = 0

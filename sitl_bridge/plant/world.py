@@ -33,6 +33,17 @@ from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 STOPPED = (0.0,) * MOST_ROTORS
 """Controls of rotors at rest."""
 
+SCHEDULE = np.dtype(
+    [
+        ("steps", "i8"),  # integration steps of a tick
+        ("step", "f8"),  # s
+        ("force_hold", "i8"),  # steps that a row of the table of forces acts
+        ("wind_hold", "i8"),  # likewise
+        ("home_altitude", "f8"),  # m above mean sea level
+    ]
+)
+"""What stays the same from tick to tick."""
+
 
 class World:
     """State and what acts on it. `state` is the vector of `plant.state`, world ENU, SI units."""
@@ -69,16 +80,29 @@ class World:
             self._wind.table,
             work,
         )
-        self._measure = measure.bind(
-            self._record,
-            self.state,
-            self.inner,
-            self._force.now,
-            self._wind.now,
+        sensed = (
             work,
             np.array(field_at(vehicle.home)),
             self.reactions,
             self._truth,
+        )
+        self._measure = measure.bind(
+            self._record, self.state, self.inner, self._force.now, self._wind.now, *sensed
+        )
+        plan = (self.steps_per_tick, self.step, self._force.hold_steps, self._wind.hold_steps, altitude)
+        self._arrays = (
+            self._record,
+            np.array([plan], dtype=SCHEDULE),
+            self.state,
+            self.inner,
+            self._speed_share,
+            self.rotor_speed,
+            self._force.table,
+            self._force.now,
+            self._wind.table,
+            self._wind.now,
+            *sensed,
+            *self.instruments.arrays(),
         )
         self.reset()
 
@@ -108,7 +132,7 @@ class World:
         if sensors.tracker is not None:
             self.tracker = LoadTracker(sensors.tracker, self._period, self._seed)
 
-    def command(self, controls: Sequence[float]) -> None:
+    def command(self, controls: Sequence[float] | Array) -> None:
         """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""
         self._controls[:] = controls
         self._set_rotors()
@@ -124,6 +148,29 @@ class World:
             force.advance(covered)
             wind.advance(covered)
             steps -= covered
+
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What `tick.exchange` needs of the world, in its order, as it changes."""
+        return self._arrays
+
+    def ticks_left(self, sensor_tick: int) -> int:
+        """How many ticks, the last measured one being `sensor_tick`, need no more than `tick.exchange`."""
+        ticks = min(self.instruments.ticks_left(sensor_tick), self.gps.ticks_left(sensor_tick))
+        for held in (self._force, self._wind):
+            if not held.constant:
+                ticks = min(ticks, (held.steps_left - 1) // self.steps_per_tick)
+        return 0 if self.tracker is not None else ticks
+
+    def next_steps(self) -> tuple[int, int]:
+        """Number of the next step in the tables of held forces and winds."""
+        return self._force.next_step, self._wind.next_step
+
+    def flown(self) -> None:
+        """A tick was flown by `tick.exchange`."""
+        if not self._force.constant:
+            self._force.advance(self.steps_per_tick)
+        if not self._wind.constant:
+            self._wind.advance(self.steps_per_tick)
 
     def battery(self, duration: float) -> BatteryReading | None:
         """Draw on the battery for `duration` seconds at the rotors' present speeds; None: there is none."""

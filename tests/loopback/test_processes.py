@@ -62,6 +62,15 @@ def test_a_killed_controller_is_taken_back_in_lockstep(start: Start, port: int, 
     assert end == pytest.approx([3.0, 5.0, 2.0], abs=0.01)
 
 
+def test_a_plant_at_another_rate_is_not_flown(start: Start, port: int) -> None:
+    plant = start(*plant_arguments(port, "--clock", "lockstep", "--speed", "1", "--rate", "500"))
+    controller = start(*controller_arguments(port))
+    controller.wait_for("the plant ticks every 2 ms (500 Hz), the law is designed for 250 Hz: not armed")
+    plant.popen.send_signal(signal.SIGTERM)
+    _, _, said = plant.finish()
+    assert "the autopilot is armed" not in said
+
+
 def test_a_killed_controller_stops_the_rotors_in_real_time(start: Start, port: int) -> None:
     plant = start(*plant_arguments(port))
     controller = start(*controller_arguments(port))

@@ -104,6 +104,11 @@ class GpsReceiver:
             gps.dropouts_per_hour, gps.dropout_duration, period, stream(seed, "gps.dropouts")
         )
 
+    def ticks_left(self, tick: int) -> int:
+        """How many ticks after `tick` pass without anything to do for the receiver."""
+        ticks = self.every - 1 - tick % self.every
+        return min(ticks, self._under_way[0][0] - tick - 1) if self._under_way else ticks
+
     def sample(self, tick: int, x: Array) -> GpsFix | None:
         """The fix that arrives at `tick` (counted from 0 or 1, each once), the state being x now."""
         if tick % self.every == 0:

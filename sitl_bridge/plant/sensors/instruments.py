@@ -9,6 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.plant.sensors.atmosphere import SEA_LEVEL_PRESSURE
@@ -160,8 +161,16 @@ class Instruments:
         self._sensors = {name: getattr(sensors, name) for name in PLACES}
         for name, instrument in self._sensors.items():
             self._set_figures(name, instrument)
-        self._read = read.bind(truth, self._errors, self._garbage, self._figures, self._timing, self.reading)
+        self._read = read.bind(truth, *self.arrays())
         self.reset(seed)
+
+    def arrays(self) -> tuple[Array, Array, Array, NDArray[np.int64], NDArray[Any]]:
+        """The arrays of `read` behind the truth, as they change."""
+        return self._errors, self._garbage, self._figures, self._timing, self.reading
+
+    def ticks_left(self, tick: int) -> int:
+        """How many ticks after `tick` fresh errors are to be drawn."""
+        return ROWS - 1 - tick % ROWS
 
     def reset(self, seed: int) -> None:
         """Begin again at tick 0 with fresh random streams, every sensor working."""

@@ -1,0 +1,103 @@
+"""A tick in one compiled call is the tick in steps: the same bytes on the link, the same rows in the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from controller.autopilot import Autopilot
+from controller.feedback import TruthFeedback
+from controller.hil.session import new_session
+from controller.reference import setpoint
+from sitl_bridge.plant.faults import Faults, LoadFault, RotorFault, SensorFault
+from sitl_bridge.plant.lockstep import Lockstep
+from sitl_bridge.plant.notices import Notices
+from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.statelog import StateLog
+from sitl_bridge.vehicle import load_vehicle
+from tests.plant.network import Faults as Loss
+from tests.plant.network import Network
+
+RATE_HZ = 250.0
+
+
+class InParts(TruthFeedback):
+    """Truth, but the autopilot has to take each tick apart."""
+
+    plain = False
+
+
+def flight(
+    path: Path, name: str, overrides: list[str], faults: Faults, loss: Loss, whole: bool
+) -> tuple[dict[str, list[bytes]], int]:
+    """What both said in a flight of 6 s, and how many ticks the plant flew in one call."""
+    vehicle = load_vehicle(name, overrides)
+    simulation = Simulation(vehicle, RATE_HZ, 3, duration_s=6.0, faults=faults)
+    log = StateLog(path, simulation.world)
+    simulation.record_with(log)
+    flown_whole = 0
+
+    def exchange(datagram: bytes) -> bool:
+        nonlocal flown_whole
+        flown = whole and Simulation.exchange(simulation, datagram)
+        flown_whole += flown
+        return flown
+
+    simulation.exchange = exchange  # type: ignore[method-assign]
+    session = new_session(
+        lambda controls: Autopilot(
+            vehicle, "default", RATE_HZ, lambda start: setpoint((1.0, 2.0, start[2] + 1.0), start), controls
+        ),
+        0,
+        lambda text: None,
+        TruthFeedback() if whole else InParts(),
+    )
+    network = Network(Lockstep(simulation, Notices(lambda text: None), 0), session, loss)
+    network.run(lambda: simulation.finished)
+    log.close()
+    return network.sent, flown_whole
+
+
+FLIGHTS = {
+    "paper with noise": ("paper", ["disturbance.force_std=5"], Faults()),
+    "everything": (
+        "iris",
+        [
+            "initial.start=hover",
+            "sensors.preset=urban",
+            "air.wind=[3, 1, 0]",
+            "air.turbulence.wind_at_6_m=7.7",
+        ],
+        Faults(
+            sensor=(SensorFault(at=2.0, duration=1.0, sensor="gps", failure="wrong"),),
+            rotor=(RotorFault(at=3.0, duration=0.1, rotor=2, thrust=0.8),),
+            load=(LoadFault(at=4.0, mass=0.4),),
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_both_ways_say_and_log_the_same(name: str, tmp_path: Path) -> None:
+    vehicle, overrides, faults = FLIGHTS[name]
+    whole, flown_whole = flight(tmp_path / "whole", vehicle, overrides, faults, Loss(), whole=True)
+    parts, flown_in_parts = flight(tmp_path / "parts", vehicle, overrides, faults, Loss(), whole=False)
+    assert flown_in_parts == 0
+    assert flown_whole > 0.5 * 6.0 * RATE_HZ  # or nothing is compared here
+    assert whole == parts
+    assert pq.read_table(tmp_path / "whole").equals(pq.read_table(tmp_path / "parts"))
+
+
+def test_loss_and_duplicates_change_nothing_either(tmp_path: Path) -> None:
+    vehicle, overrides, faults = FLIGHTS["paper with noise"]
+    flight(tmp_path / "calm", vehicle, overrides, faults, Loss(), whole=True)
+    rough = Loss(drop=0.1, duplicate=0.1, jitter_s=0.01, seed=4)
+    flight(tmp_path / "rough", vehicle, overrides, faults, rough, whole=True)
+    assert (tmp_path / "calm").read_bytes() == (tmp_path / "rough").read_bytes()
+
+
+def test_a_loop_delay_is_flown_in_steps(tmp_path: Path) -> None:
+    _, flown_whole = flight(tmp_path / "log", "paper", ["loop.delay_ticks=2"], Faults(), Loss(), whole=True)
+    assert flown_whole == 0
