@@ -1,24 +1,18 @@
-"""Air: drag of vehicle and load; wind, gusts and turbulence at both.
-
-Turbulence is Dryden's, with scales and intensities of MIL-F-8785C at low altitude (3.7.3.4, figures 10 and
-11): a frozen field that drifts past at a constant airspeed, so its time series does not depend on the
-flight. Each filter is discretised exactly, state and output covariance included, and starts in its
-stationary distribution.
-"""
+"""Air: drag of vehicle and load; wind, gusts and turbulence at both."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from sitl_bridge.compiled import kernel
 from sitl_bridge.plant.state import Array
 from sitl_bridge.plant.streams import stream
-from sitl_bridge.vehicle import Air, Gust, Turbulence, Vehicle
+from sitl_bridge.plant.turbulence import Turbulent, dryden
+from sitl_bridge.vehicle import Air, Gust, Vehicle
 
-FEET_PER_METRE = 1.0 / 0.3048
 WIND_HOLD = 0.01
 """s; each row of the wind table holds so long."""
 
@@ -42,89 +36,6 @@ def add_drag(p: Any, x: Array, wind: Array, out: Array) -> None:
     out[16] -= slowing * ux
     out[17] -= slowing * uy
     out[18] -= slowing * uz
-
-
-class Dryden(NamedTuple):
-    """Scales (m) and intensities (m/s) of turbulence: along the wind, across it, vertical."""
-
-    length: tuple[float, float, float]
-    intensity: tuple[float, float, float]
-
-
-def dryden(turbulence: Turbulence) -> Dryden:
-    """MIL-F-8785C below 1000 ft: L_w = h, L_u = L_v = h / (0.177 + 0.000823 h)^1.2 with h in ft;
-    sigma_w = 0.1 W_20, sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4."""
-    feet = turbulence.height * FEET_PER_METRE
-    factor = 0.177 + 0.000823 * feet
-    along = feet / factor**1.2 / FEET_PER_METRE
-    vertical = 0.1 * turbulence.wind_at_6_m
-    level = vertical / factor**0.4
-    return Dryden((along, along, turbulence.height), (level, level, vertical))
-
-
-class Turbulent:
-    """Dryden turbulence at one point, drawn in blocks of samples `hold` seconds apart, (n, 3) in m/s.
-
-    Along the wind: H = s sqrt(2 L / (pi V)) / (1 + L s / V), across and vertical:
-    H = s sqrt(L / (pi V)) (1 + sqrt(3) L s / V) / (1 + L s / V)², driven by white noise. The second is
-    realised by z1' = -a z1 + w, z2' = -a z2 + z1, a = V / L, and its output combines both.
-    """
-
-    def __init__(self, turbulence: Turbulence, hold: float, generator: np.random.Generator) -> None:
-        self.generator = generator
-        figures = dryden(turbulence)
-        rate = turbulence.airspeed / figures.length[0]
-        self._keep = math.exp(-rate * hold)
-        self._std = figures.intensity[0] * math.sqrt(-math.expm1(-2.0 * rate * hold))
-        self._along = figures.intensity[0] * float(generator.standard_normal())
-        self._axes = [
-            _DoublePole(turbulence.airspeed / figures.length[axis], figures.intensity[axis], hold, generator)
-            for axis in (1, 2)
-        ]
-
-    def draw(self, count: int) -> Array:
-        """The next `count` samples, (count, 3): along the wind, to the left of it, up."""
-        normal = self.generator.standard_normal((count, 5))
-        out = np.empty((count, 3))
-        along = self._along
-        for row, value in enumerate((self._std * normal[:, 0]).tolist()):
-            along = self._keep * along + value
-            out[row, 0] = along
-        self._along = along
-        for axis, pole in enumerate(self._axes):
-            out[:, axis + 1] = pole.run(normal[:, 1 + 2 * axis : 3 + 2 * axis])
-        return out
-
-
-class _DoublePole:
-    """sigma (1 + sqrt(3) s / a) / (1 + s / a)² of unit-variance output shape, exact at samples."""
-
-    def __init__(self, rate: float, intensity: float, hold: float, generator: np.random.Generator) -> None:
-        self.decay = math.exp(-rate * hold)
-        self.hold = hold
-        # Covariance that white noise of unit intensity adds in one hold: integrals of (1, t, t²) exp(-2 a t).
-        a2, e2 = 2.0 * rate, math.exp(-2.0 * rate * hold)
-        i0 = -math.expm1(-a2 * hold) / a2
-        i1 = (i0 - hold * e2) / a2
-        i2 = (2.0 * i1 - hold * hold * e2) / a2
-        self.factor = np.linalg.cholesky(np.array([[i0, i1], [i1, i2]]))
-        stationary = np.array([[1.0 / a2, 1.0 / a2**2], [1.0 / a2**2, 2.0 / a2**3]])
-        self.state = np.linalg.cholesky(stationary) @ generator.standard_normal(2)
-        gain = intensity / math.sqrt(rate) * rate * rate
-        self.output = np.array([gain * math.sqrt(3.0) / rate, gain * (1.0 - math.sqrt(3.0))])
-
-    def run(self, normal: Array) -> Array:
-        """Filter (n, 2) unit normal draws into (n,) samples."""
-        kicks = (normal @ self.factor.T).tolist()
-        first, second = self.state.tolist()
-        path = np.empty((len(kicks), 2))
-        decay, hold = self.decay, self.hold
-        for row, (one, two) in enumerate(kicks):
-            first, second = decay * first + one, decay * (second + hold * first) + two
-            path[row] = first, second
-        self.state[:] = first, second
-        wind: Array = path @ self.output
-        return wind
 
 
 def gust_velocity(gust: Gust, time: Array) -> Array:

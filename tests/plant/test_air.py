@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from sitl_bridge.plant.air import WIND_HOLD, Turbulent, Wind, dryden, gust_velocity
+from sitl_bridge.plant.air import WIND_HOLD, Wind, gust_velocity
 from sitl_bridge.plant.streams import stream
+from sitl_bridge.plant.turbulence import Turbulent, dryden
 from sitl_bridge.vehicle import Gust, Turbulence, Vehicle, load_vehicle
 from tests.plant.flying import flight
 
