@@ -9,10 +9,11 @@ its name holds the machine and the versions it was made for, so that environment
 not overwrite each other's. Code is loaded only from next to the sources (whoever writes there can change
 them too) and from directories that belong to the user and nobody else can write.
 
-Two decorators mark what is compiled:
+Three decorators mark what is compiled:
 
 - `@kernel`: a function that other compiled functions call. In a flight it stays plain Python, so tests can
   differentiate it with complex numbers, and a debugger can step through it.
+- `@vector_kernel`: one whose loops the compiler may take several elements at a time.
 - `@entry_point(...)`: a function that Python calls at every tick. Its arguments are arrays of fixed type and
   shape, then scalars. `entry.bind(arrays…)` gives a callable that takes the scalars.
 
@@ -76,6 +77,16 @@ def kernel(function: Function) -> Function:
         from numba import njit
 
         compiled: Function = njit(error_model="numpy")(function)
+        return compiled
+    return function
+
+
+def vector_kernel(function: Function) -> Function:
+    """Mark a kernel whose sums may be taken in any order, so that one instruction works on several terms."""
+    if os.environ.get(_COMPILING):
+        from numba import njit
+
+        compiled: Function = njit(error_model="numpy", fastmath={"reassoc"})(function)
         return compiled
     return function
 

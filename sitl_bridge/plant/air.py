@@ -18,24 +18,16 @@ WIND_HOLD = 0.01
 
 
 @kernel
-def add_drag(p: Any, x: Array, wind: Array, out: Array) -> None:
-    """Add what drag does to the accelerations of vehicle and load.
+def drag_force(
+    linear: Any, quadratic: Any, vx: Any, vy: Any, vz: Any, wind_x: Any, wind_y: Any, wind_z: Any
+) -> tuple[Any, Any, Any]:
+    """Drag on a body, N, world: against its velocity through the air, linear and quadratic in it.
 
-    p: parameter record; x: state; wind: (6,) air velocity at vehicle and load, m/s, world; out: (19,),
-    changed.
+    linear: N s/m; quadratic: N s²/m²; v: m/s, of the body, world; wind: m/s, of the air there, world.
     """
-    ux, uy, uz = x[3] - wind[0], x[4] - wind[1], x[5] - wind[2]
-    speed = (ux * ux + uy * uy + uz * uz) ** 0.5
-    slowing = (p.vehicle_drag[0] + p.vehicle_drag[1] * speed) / p.vehicle_mass
-    out[3] -= slowing * ux
-    out[4] -= slowing * uy
-    out[5] -= slowing * uz
-    ux, uy, uz = x[16] - wind[3], x[17] - wind[4], x[18] - wind[5]
-    speed = (ux * ux + uy * uy + uz * uz) ** 0.5
-    slowing = (p.load_drag[0] + p.load_drag[1] * speed) / p.load_mass
-    out[16] -= slowing * ux
-    out[17] -= slowing * uy
-    out[18] -= slowing * uz
+    ux, uy, uz = vx - wind_x, vy - wind_y, vz - wind_z
+    slowing = linear + quadratic * (ux * ux + uy * uy + uz * uz) ** 0.5
+    return -slowing * ux, -slowing * uy, -slowing * uz
 
 
 def gust_velocity(gust: Gust, time: Array) -> Array:

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point, kernel
-from sitl_bridge.plant.air import add_drag
+from sitl_bridge.plant.air import drag_force
 from sitl_bridge.plant.cable import cable_acts, slack_or_taut, spring_force, tension
-from sitl_bridge.plant.ground import ground_on_load, ground_on_vehicle, move_anchors
+from sitl_bridge.plant.ground import LOOSE, ground_on_load, ground_on_vehicle, move_anchors
 from sitl_bridge.plant.parameters import PARAMETERS
 from sitl_bridge.plant.rotors import rotor_decay, rotor_wrench, spin_up
 from sitl_bridge.plant.state import (
@@ -56,7 +56,7 @@ def rates(
 
     p: parameter record; x: state (19,), see `state`; inner: inner state (35,), of which anchors are read;
     wrench: of the rotors; acts: whether the cable exerts its force; force: (6,) external force on vehicle
-    and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (6,) or more,
+    and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (7,) or more,
     scratch; out: (19,), written.
     """
     vx, vy, vz = x[3], x[4], x[5]
@@ -65,53 +65,45 @@ def rates(
     wx, wy, wz = x[16], x[17], x[18]
     thrust, roll, pitch, yaw = wrench
 
-    out[0], out[1], out[2] = vx, vy, vz
-    out[13], out[14], out[15] = wx, wy, wz
-    # Translation (eq. 3): the body's z axis in the world carries the thrust (eq. 7).
-    lift = thrust / p.vehicle_mass
+    # Forces on vehicle and load: the body's z axis in the world carries the thrust (eqs. 3 and 7).
+    force_x = force[0] + 2.0 * (qx * qz + qw * qy) * thrust
+    force_y = force[1] + 2.0 * (qy * qz - qw * qx) * thrust
+    force_z = force[2] + (1.0 - 2.0 * (qx * qx + qy * qy)) * thrust
+    load_x, load_y, load_z = force[3], force[4], force[5]
     if acts:
         # The cable: e points from the vehicle to the load.
         ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
         length = (ex * ex + ey * ey + ez * ez) ** 0.5
-        ex, ey, ez = ex / length, ey / length, ez / length
-        rate = (wx - vx) * ex + (wy - vy) * ey + (wz - vz) * ez
-        pull = spring_force(p, length, rate)
-        tug = pull / p.vehicle_mass
-        out[3] = 2.0 * (qx * qz + qw * qy) * lift + tug * ex + force[0] / p.vehicle_mass
-        out[4] = 2.0 * (qy * qz - qw * qx) * lift + tug * ey + force[1] / p.vehicle_mass
-        out[5] = (1.0 - 2.0 * (qx * qx + qy * qy)) * lift + tug * ez + force[2] / p.vehicle_mass - p.gravity
-        load_tug = pull / p.load_mass
-        out[16] = -load_tug * ex + force[3] / p.load_mass
-        out[17] = -load_tug * ey + force[4] / p.load_mass
-        out[18] = -load_tug * ez + force[5] / p.load_mass - p.gravity
-    else:
-        out[3] = 2.0 * (qx * qz + qw * qy) * lift + force[0] / p.vehicle_mass
-        out[4] = 2.0 * (qy * qz - qw * qx) * lift + force[1] / p.vehicle_mass
-        out[5] = (1.0 - 2.0 * (qx * qx + qy * qy)) * lift + force[2] / p.vehicle_mass - p.gravity
-        out[16], out[17] = force[3] / p.load_mass, force[4] / p.load_mass
-        out[18] = force[5] / p.load_mass - p.gravity
+        shrink = 1.0 / length
+        ex, ey, ez = ex * shrink, ey * shrink, ez * shrink
+        pull = spring_force(p, length, (wx - vx) * ex + (wy - vy) * ey + (wz - vz) * ez)
+        force_x, force_y, force_z = force_x + pull * ex, force_y + pull * ey, force_z + pull * ez
+        load_x, load_y, load_z = load_x - pull * ex, load_y - pull * ey, load_z - pull * ez
+    if p.has_drag:
+        dx, dy, dz = drag_force(p.vehicle_drag[0], p.vehicle_drag[1], vx, vy, vz, wind[0], wind[1], wind[2])
+        force_x, force_y, force_z = force_x + dx, force_y + dy, force_z + dz
+        dx, dy, dz = drag_force(p.load_drag[0], p.load_drag[1], wx, wy, wz, wind[3], wind[4], wind[5])
+        load_x, load_y, load_z = load_x + dx, load_y + dy, load_z + dz
+    if p.has_ground:
+        if x[2].real - p.ground_height < p.leg_reach:
+            ground_on_vehicle(p, x, inner, ground)
+            force_x, force_y, force_z = force_x + ground[0], force_y + ground[1], force_z + ground[2]
+            roll, pitch, yaw = roll + ground[3], pitch + ground[4], yaw + ground[5]
+        if x[15].real - p.ground_height < p.load_radius:
+            gx, gy, gz = ground_on_load(p, x, inner)
+            load_x, load_y, load_z = load_x + gx, load_y + gy, load_z + gz
+    # Translation.
+    lightness = 1.0 / p.vehicle_mass
+    out[0], out[1], out[2] = vx, vy, vz
+    out[3], out[4], out[5] = force_x * lightness, force_y * lightness, force_z * lightness - p.gravity
+    lightness = 1.0 / p.load_mass
+    out[13], out[14], out[15] = wx, wy, wz
+    out[16], out[17], out[18] = load_x * lightness, load_y * lightness, load_z * lightness - p.gravity
     # Attitude: q' = q (0, p, q, r) / 2.
     out[6] = -0.5 * (qx * rate_p + qy * rate_q + qz * rate_r)
     out[7] = 0.5 * (qw * rate_p + qy * rate_r - qz * rate_q)
     out[8] = 0.5 * (qw * rate_q + qz * rate_p - qx * rate_r)
     out[9] = 0.5 * (qw * rate_r + qx * rate_q - qy * rate_p)
-
-    if p.has_drag:
-        add_drag(p, x, wind, out)
-    if p.has_ground:
-        if x[2].real - p.ground_height < p.leg_reach:
-            ground_on_vehicle(p, x, inner, ground)
-            out[3] += ground[0] / p.vehicle_mass
-            out[4] += ground[1] / p.vehicle_mass
-            out[5] += ground[2] / p.vehicle_mass
-            roll += ground[3]
-            pitch += ground[4]
-            yaw += ground[5]
-        if x[15].real - p.ground_height < p.load_radius:
-            fx, fy, fz = ground_on_load(p, x, inner)
-            out[16] += fx / p.load_mass
-            out[17] += fy / p.load_mass
-            out[18] += fz / p.load_mass
     # Rotation (eq. 10).
     inertia_x, inertia_y, inertia_z = p.inertia[0], p.inertia[1], p.inertia[2]
     out[10] = (roll - (inertia_z - inertia_y) * rate_q * rate_r) / inertia_x
@@ -141,16 +133,18 @@ def runge_kutta_4(
     start = middle = end
     if p.has_lag:
         start, middle = rotor_wrench(p, inner), rotor_wrench(p, work[_MIDDLE])
-    rates(p, x, inner, start, acts, force, wind, ground, k1)
     for i in range(STATE_SIZE):
-        probe[i] = x[i] + half * k1[i]
-    rates(p, probe, inner, middle, acts, force, wind, ground, k2)
-    for i in range(STATE_SIZE):
-        probe[i] = x[i] + half * k2[i]
-    rates(p, probe, inner, middle, acts, force, wind, ground, k3)
-    for i in range(STATE_SIZE):
-        probe[i] = x[i] + step * k3[i]
-    rates(p, probe, inner, end, acts, force, wind, ground, k4)
+        probe[i] = x[i]
+    # One call for all four stages, so that the compiler can put `rates` in its place.
+    for stage in range(4):
+        rate = work[stage]
+        wrench = start if stage == 0 else middle
+        if stage == 3:
+            wrench = end
+        rates(p, probe, inner, wrench, acts, force, wind, ground, rate)
+        ahead = step if stage == 2 else half
+        for i in range(STATE_SIZE):
+            probe[i] = x[i] + ahead * rate[i]
     for i in range(STATE_SIZE):
         x[i] += sixth * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     norm = math.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
@@ -251,6 +245,7 @@ def whole_step(
     p: Any, x: Array, inner: Array, command: Array, force: Array, wind: Array, step: float, work: Array
 ) -> None:
     """Advance state and inner state by one step, in place; the decays of half a step are in `work`."""
+    work[_GROUND, LOOSE] = 0.0
     acts = cable_acts(p, x, inner)
     watched = inner[CABLE_HOLDS] > 0.0 and not p.two_way
     if watched:
@@ -265,7 +260,7 @@ def whole_step(
         for i in range(p.rotor_count):
             inner[i] = work[_END, i]
     if p.has_ground:
-        move_anchors(p, x, inner)
+        move_anchors(p, x, inner, work[_GROUND, LOOSE] > 0.0)
     if p.breaking_tension < math.inf and inner[CABLE_HOLDS] > 0.0 and pull_of(p, x) > p.breaking_tension:
         inner[CABLE_HOLDS] = 0.0
 
@@ -352,10 +347,15 @@ def advance(
     """
     p = record[0]
     rotor_decay(p, 0.5 * step, work[_DECAY])
-    for index in range(steps):
-        force = forces[(first_force + index) // force_hold]
-        wind = winds[(first_wind + index) // wind_hold]
-        whole_step(p, x, inner, command, force, wind, step, work)
+    force_row, force_age = first_force // force_hold, first_force % force_hold
+    wind_row, wind_age = first_wind // wind_hold, first_wind % wind_hold
+    for _ in range(steps):
+        whole_step(p, x, inner, command, forces[force_row], winds[wind_row], step, work)
+        force_age, wind_age = force_age + 1, wind_age + 1
+        if force_age == force_hold:
+            force_row, force_age = force_row + 1, 0
+        if wind_age == wind_hold:
+            wind_row, wind_age = wind_row + 1, 0
     return steps
 
 
@@ -369,7 +369,7 @@ def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -
     """
     acts = p.two_way or slack_or_taut(p, x.real) > 0.0
     anchored = np.zeros(INNER_SIZE)
-    rates(p, x, anchored, rotor_wrench(p, rotor_speed), acts, force, np.zeros(6), np.zeros(6), out)
+    rates(p, x, anchored, rotor_wrench(p, rotor_speed), acts, force, np.zeros(6), np.zeros(7), out)
 
 
 @entry_point(

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from sitl_bridge.compiled import kernel
-from sitl_bridge.plant.state import FIRST_ANCHOR, LOAD_CONTACT, Array
+from sitl_bridge.compiled import kernel, vector_kernel
+from sitl_bridge.plant.state import ANCHOR_EAST, ANCHOR_NORTH, LEG_LANES, LOAD_CONTACT, Array
 from sitl_bridge.vehicle import Ground
 
 
@@ -29,6 +29,22 @@ def contact(ground: Ground, gravity: float, mass: float, points: int) -> tuple[f
     frequency = math.sqrt(gravity / ground.sink)
     chi = 2.0 * ground.damping_ratio * frequency / gravity
     return stiffness, chi, 2.0 * ground.damping_ratio * stiffness / frequency
+
+
+@kernel
+def rotation_matrix(qw: Any, qx: Any, qy: Any, qz: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]:
+    """Body to world, row by row, of a unit quaternion."""
+    return (
+        1 - 2 * (qy * qy + qz * qz),
+        2 * (qx * qy - qw * qz),
+        2 * (qx * qz + qw * qy),
+        2 * (qx * qy + qw * qz),
+        1 - 2 * (qx * qx + qz * qz),
+        2 * (qy * qz - qw * qx),
+        2 * (qx * qz - qw * qy),
+        2 * (qy * qz + qw * qx),
+        1 - 2 * (qx * qx + qy * qy),
+    )
 
 
 @kernel
@@ -62,36 +78,73 @@ def contact_force(
     return fx, fy, normal
 
 
-@kernel
-def ground_on_vehicle(p: Any, x: Array, inner: Array, out: Array) -> None:
-    """Force (N, world) and moment (N m, body) of the ground on all legs.
+@vector_kernel
+def ground_on_standing(p: Any, x: Array, inner: Array, out: Array) -> int:
+    """As `ground_on_vehicle`, if every leg stands and sticks; returns how many do not."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_matrix(x[6], x[7], x[8], x[9])
+    # Turning, in the world.
+    wx = r00 * x[10] + r01 * x[11] + r02 * x[12]
+    wy = r10 * x[10] + r11 * x[11] + r12 * x[12]
+    wz = r20 * x[10] + r21 * x[11] + r22 * x[12]
+    px, py, vx, vy, vz = x[0], x[1], x[3], x[4], x[5]
+    below = p.ground_height - x[2]
+    chi, friction = p.contact_chi, p.leg_friction
+    total_x, total_y, total_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    loose = 0
+    for block in range(p.leg_blocks):
+        east = inner[ANCHOR_EAST + LEG_LANES * block : ANCHOR_EAST + LEG_LANES * (block + 1)]
+        north = inner[ANCHOR_NORTH + LEG_LANES * block : ANCHOR_NORTH + LEG_LANES * (block + 1)]
+        for i in range(LEG_LANES):
+            bx, by, bz = p.leg_x[block, i], p.leg_y[block, i], p.leg_z[block, i]
+            stiffness, damping = p.leg_stiffness[block, i], p.leg_damping[block, i]
+            ax = r00 * bx + r01 * by + r02 * bz
+            ay = r10 * bx + r11 * by + r12 * bz
+            az = r20 * bx + r21 * by + r22 * bz
+            fx = -stiffness * (px + ax - east[i]) - damping * (vx + wy * az - wz * ay)
+            fy = -stiffness * (py + ay - north[i]) - damping * (vy + wz * ax - wx * az)
+            depth, rise = below - az, vz + wx * ay - wy * ax
+            fz = stiffness * depth * (1.0 - chi * rise)
+            most = friction * fz
+            # Without branches; a leg that is not there has zeros throughout, and is not loose.
+            loose += (depth <= 0.0) & (stiffness > 0.0) | (fz < 0.0) | (fx * fx + fy * fy > most * most)
+            total_x += fx
+            total_y += fy
+            total_z += fz
+            moment_x += ay * fz - az * fy
+            moment_y += az * fx - ax * fz
+            moment_z += ax * fy - ay * fx
+    out[0], out[1], out[2] = total_x, total_y, total_z
+    out[3] = r00 * moment_x + r10 * moment_y + r20 * moment_z
+    out[4] = r01 * moment_x + r11 * moment_y + r21 * moment_z
+    out[5] = r02 * moment_x + r12 * moment_y + r22 * moment_z
+    return loose
 
-    p: parameter record; x: state; inner: inner state; out: (6,) or more, [0:6] written.
-    """
-    qw, qx, qy, qz = x[6], x[7], x[8], x[9]
-    r00, r01, r02 = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qw * qz), 2 * (qx * qz + qw * qy)
-    r10, r11, r12 = 2 * (qx * qy + qw * qz), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qw * qx)
-    r20, r21, r22 = 2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy)
+
+@kernel
+def ground_on_moving(p: Any, x: Array, inner: Array, out: Array) -> None:
+    """As `ground_on_vehicle`, whatever the legs do: in the air, sticking or slipping."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_matrix(x[6], x[7], x[8], x[9])
     # Turning, in the world.
     wx = r00 * x[10] + r01 * x[11] + r02 * x[12]
     wy = r10 * x[10] + r11 * x[11] + r12 * x[12]
     wz = r20 * x[10] + r21 * x[11] + r22 * x[12]
     total_x, total_y, total_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(p.leg_count):
-        bx, by, bz = p.leg_x[i], p.leg_y[i], p.leg_z[i]
+        block, lane = i // LEG_LANES, i % LEG_LANES
+        bx, by, bz = p.leg_x[block, lane], p.leg_y[block, lane], p.leg_z[block, lane]
         ax, ay, az = (
             r00 * bx + r01 * by + r02 * bz,
             r10 * bx + r11 * by + r12 * bz,
             r20 * bx + r21 * by + r22 * bz,
         )
         fx, fy, fz = contact_force(
-            p.leg_stiffness,
+            p.leg_stiffness[block, lane],
             p.contact_chi,
-            p.leg_damping,
+            p.leg_damping[block, lane],
             p.leg_friction,
             p.ground_height - x[2] - az,
-            x[0] + ax - inner[FIRST_ANCHOR + 2 * i],
-            x[1] + ay - inner[FIRST_ANCHOR + 2 * i + 1],
+            x[0] + ax - inner[ANCHOR_EAST + i],
+            x[1] + ay - inner[ANCHOR_NORTH + i],
             x[3] + wy * az - wz * ay,
             x[4] + wz * ax - wx * az,
             x[5] + wx * ay - wy * ax,
@@ -109,17 +162,31 @@ def ground_on_vehicle(p: Any, x: Array, inner: Array, out: Array) -> None:
 
 
 @kernel
+def ground_on_vehicle(p: Any, x: Array, inner: Array, out: Array) -> None:
+    """Force (N, world) and moment (N m, body) of the ground on all legs.
+
+    p: parameter record; x: state; inner: inner state; out: (7,) or more, [0:6] written, and LOOSE set where
+    a leg does not both stand and stick.
+    """
+    if ground_on_standing(p, x, inner, out) > 0:
+        ground_on_moving(p, x, inner, out)
+        out[LOOSE] = 1.0
+
+
+LOOSE = 6
+
+
+@kernel
 def ground_on_load(p: Any, x: Array, inner: Array) -> tuple[Any, Any, Any]:
     """Force of the ground on the load, N, world."""
-    place = FIRST_ANCHOR + 2 * LOAD_CONTACT
     fx, fy, fz = contact_force(
         p.load_stiffness,
         p.contact_chi,
         p.load_damping,
         p.load_friction,
         p.ground_height + p.load_radius - x[15],
-        x[13] - inner[place],
-        x[14] - inner[place + 1],
+        x[13] - inner[ANCHOR_EAST + LOAD_CONTACT],
+        x[14] - inner[ANCHOR_NORTH + LOAD_CONTACT],
         x[16],
         x[17],
         x[18],
@@ -136,60 +203,61 @@ def slip(
     rise: float,
     px: float,
     py: float,
-    anchor: Array,
+    inner: Array,
+    number: int,
 ) -> None:
     """Move one contact's anchor, after a step: under the point when aloft, along with it where it slips.
 
-    depth, rise: m and m/s, of the point; px, py: m, where it is; anchor: (2,), m, world, written.
+    depth, rise: m and m/s, of the point; px, py: m, where it is; inner: inner state, written.
     An anchor only ever moves towards its point, so slipping takes energy out of the spring.
     """
     normal = stiffness * depth * (1.0 - chi * rise)
     if depth <= 0.0 or normal <= 0.0:
-        anchor[0], anchor[1] = px, py
+        inner[ANCHOR_EAST + number], inner[ANCHOR_NORTH + number] = px, py
         return
-    sx, sy = px - anchor[0], py - anchor[1]
+    sx, sy = px - inner[ANCHOR_EAST + number], py - inner[ANCHOR_NORTH + number]
     squared = sx * sx + sy * sy
-    most = friction * normal / stiffness
+    most = friction * depth * (1.0 - chi * rise)
     if squared > most * most:
         share = most / math.sqrt(squared)
-        anchor[0], anchor[1] = px - sx * share, py - sy * share
+        inner[ANCHOR_EAST + number], inner[ANCHOR_NORTH + number] = px - sx * share, py - sy * share
 
 
 @kernel
-def move_anchors(p: Any, x: Array, inner: Array) -> None:
+def move_anchors(p: Any, x: Array, inner: Array, loose: bool) -> None:
     """Let every contact slip that has to, after a step.
 
-    p: parameter record; x: state; inner: inner state, anchors written.
+    p: parameter record; x: state; inner: inner state, anchors written; loose: whether a leg slipped or was
+    aloft in the step.
     """
-    if x[2] - p.ground_height < 2.0 * p.leg_reach:  # before the first touch, too
-        qw, qx, qy, qz = x[6], x[7], x[8], x[9]
-        r00, r01, r02 = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy - qw * qz), 2 * (qx * qz + qw * qy)
-        r10, r11, r12 = 2 * (qx * qy + qw * qz), 1 - 2 * (qx * qx + qz * qz), 2 * (qy * qz - qw * qx)
-        r20, r21, r22 = 2 * (qx * qz - qw * qy), 2 * (qy * qz + qw * qx), 1 - 2 * (qx * qx + qy * qy)
+    height = x[2] - p.ground_height
+    if loose or p.leg_reach <= height < 2.0 * p.leg_reach:  # before the first touch, too
+        r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_matrix(x[6], x[7], x[8], x[9])
         for i in range(p.leg_count):
-            bx, by, bz = p.leg_x[i], p.leg_y[i], p.leg_z[i]
+            block, lane = i // LEG_LANES, i % LEG_LANES
+            bx, by, bz = p.leg_x[block, lane], p.leg_y[block, lane], p.leg_z[block, lane]
             ux, uy, uz = x[11] * bz - x[12] * by, x[12] * bx - x[10] * bz, x[10] * by - x[11] * bx
             slip(
-                p.leg_stiffness,
+                p.leg_stiffness[block, lane],
                 p.contact_chi,
                 p.leg_friction,
                 p.ground_height - x[2] - (r20 * bx + r21 * by + r22 * bz),
                 x[5] + (r20 * ux + r21 * uy + r22 * uz),
                 x[0] + (r00 * bx + r01 * by + r02 * bz),
                 x[1] + (r10 * bx + r11 * by + r12 * bz),
-                inner[FIRST_ANCHOR + 2 * i : FIRST_ANCHOR + 2 * i + 2],
+                inner,
+                i,
             )
-    place = FIRST_ANCHOR + 2 * LOAD_CONTACT
-    depth = p.ground_height + p.load_radius - x[15]
     slip(
         p.load_stiffness,
         p.contact_chi,
         p.load_friction,
-        depth,
+        p.ground_height + p.load_radius - x[15],
         x[18],
         x[13],
         x[14],
-        inner[place : place + 2],
+        inner,
+        LOAD_CONTACT,
     )
 
 

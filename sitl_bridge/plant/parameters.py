@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.plant.ground import contact, leg_reach
-from sitl_bridge.plant.state import MOST_LEGS, MOST_ROTORS
+from sitl_bridge.plant.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
 from sitl_bridge.vehicle import Vehicle
 
 PARAMETERS = np.dtype(
@@ -37,18 +37,20 @@ PARAMETERS = np.dtype(
         ("ground_height", "f8"),
         ("contact_chi", "f8"),
         ("leg_count", "i8"),
+        ("leg_blocks", "i8"),
         ("leg_reach", "f8"),
-        ("leg_x", "f8", MOST_LEGS),
-        ("leg_y", "f8", MOST_LEGS),
-        ("leg_z", "f8", MOST_LEGS),
-        ("leg_stiffness", "f8"),
-        ("leg_damping", "f8"),
+        ("leg_x", "f8", (LEG_BLOCKS, LEG_LANES)),
+        ("leg_y", "f8", (LEG_BLOCKS, LEG_LANES)),
+        ("leg_z", "f8", (LEG_BLOCKS, LEG_LANES)),
+        ("leg_stiffness", "f8", (LEG_BLOCKS, LEG_LANES)),
+        ("leg_damping", "f8", (LEG_BLOCKS, LEG_LANES)),
         ("leg_friction", "f8"),
         ("load_radius", "f8"),
         ("load_stiffness", "f8"),
         ("load_damping", "f8"),
         ("load_friction", "f8"),
-    ]
+    ],
+    align=True,
 )
 
 Parameters = NDArray[np.void]
@@ -58,7 +60,8 @@ def parameters(vehicle: Vehicle) -> Parameters:
     """A record array of shape (1,) with everything that the equations of motion need, SI units.
 
     `reaction_coefficient` is c_Q with the sign of the torque about body z (ccw rotors: negative, eq. 13);
-    `breaking_tension` is infinite for a cable that does not break.
+    `breaking_tension` is infinite for a cable that does not break. Legs fill whole blocks: those that are not
+    there have neither stiffness nor damping.
     """
     record = np.zeros(1, dtype=PARAMETERS)
     p = record[0]
@@ -94,12 +97,13 @@ def _fill_ground(p: np.void, vehicle: Vehicle) -> None:
     p["has_ground"] = True
     p["ground_height"] = ground.height
     p["leg_count"] = len(legs)
+    p["leg_blocks"] = math.ceil(len(legs) / LEG_LANES)
+    stiffness, p["contact_chi"], damping = contact(ground, vehicle.gravity, vehicle.airframe.mass, len(legs))
     for index, leg in enumerate(legs):
-        p["leg_x"][index], p["leg_y"][index], p["leg_z"][index] = leg
+        place = divmod(index, LEG_LANES)
+        p["leg_x"][place], p["leg_y"][place], p["leg_z"][place] = leg
+        p["leg_stiffness"][place], p["leg_damping"][place] = stiffness, damping
     p["leg_reach"] = leg_reach(legs)
-    p["leg_stiffness"], p["contact_chi"], p["leg_damping"] = contact(
-        ground, vehicle.gravity, vehicle.airframe.mass, len(legs)
-    )
     p["load_stiffness"], _, p["load_damping"] = contact(ground, vehicle.gravity, vehicle.load.mass, 1)
     p["leg_friction"] = ground.friction
     p["load_friction"] = ground.load_friction

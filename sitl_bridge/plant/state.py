@@ -35,15 +35,19 @@ COLUMNS = (
 """Log column of each element of the state, in order."""
 
 MOST_ROTORS = ACTUATOR_CONTROLS
-MOST_LEGS = 8
+LEG_LANES = 4
+"""Legs are worked out so many at a time."""
+LEG_BLOCKS = 2
+MOST_LEGS = LEG_BLOCKS * LEG_LANES
 LOAD_CONTACT = MOST_LEGS  # number of the load's contact, after those of the legs
+CONTACTS = MOST_LEGS + 1
 
 ROTOR_SPEED = slice(0, MOST_ROTORS)
 """rad/s."""
-ANCHORS = slice(MOST_ROTORS, MOST_ROTORS + 2 * (MOST_LEGS + 1))
-"""East and north (m, world) of the point of the ground that each contact sticks to."""
-FIRST_ANCHOR = ANCHORS.start
-CABLE_HOLDS = ANCHORS.stop
+ANCHOR_EAST = MOST_ROTORS
+ANCHOR_NORTH = ANCHOR_EAST + CONTACTS
+"""m, world: the point of the ground that each contact sticks to; east of all contacts, then north."""
+CABLE_HOLDS = ANCHOR_NORTH + CONTACTS
 """1 while the cable joins vehicle and load, 0 once it has broken or let go."""
 INNER_SIZE = CABLE_HOLDS + 1
 
@@ -81,9 +85,7 @@ def initial_inner_state(vehicle: Vehicle) -> Array:
     attitude = quaternion_from_euler(vehicle.initial.attitude)
     for index, leg in enumerate(vehicle.airframe.legs):
         offset = rotate(attitude, leg)
-        place = FIRST_ANCHOR + 2 * index
-        inner[place : place + 2] = x + offset[0], y + offset[1]
-    place = FIRST_ANCHOR + 2 * LOAD_CONTACT
-    inner[place : place + 2] = vehicle.initial_load_position[:2]
+        inner[ANCHOR_EAST + index], inner[ANCHOR_NORTH + index] = x + offset[0], y + offset[1]
+    inner[ANCHOR_EAST + LOAD_CONTACT], inner[ANCHOR_NORTH + LOAD_CONTACT] = vehicle.initial_load_position[:2]
     inner[CABLE_HOLDS] = 1.0
     return inner

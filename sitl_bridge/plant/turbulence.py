@@ -40,7 +40,10 @@ def dryden(turbulence: Turbulence) -> Dryden:
 
 FILTERS = np.dtype(
     [
-        ("keep", "f8"),  # along the wind: share of a sample that is left in the next, and what noise adds, m/s
+        (
+            "keep",
+            "f8",
+        ),  # along the wind: share of a sample that is left in the next, and what noise adds, m/s
         ("std", "f8"),
         ("hold", "f8"),  # s between samples
         ("decay", "f8", 2),  # across and vertical, as everything below
