@@ -54,6 +54,13 @@ class Rotor(Section):
     thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
     torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
     max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
+    diameter: float | None = quantity(
+        "m",
+        "of the disc: the battery's drain is momentum theory's; without one, that of c_Q",
+        None,
+        gt=0,
+        le=20,
+    )
     time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
 
 
@@ -119,6 +126,7 @@ class Battery(Section):
     empty_cell_voltage: float = quantity("V", "open circuit, empty", 3.5, gt=0, le=10)
     charge: float = quantity("-", "share of the capacity that is left at the start", 1.0, gt=0, le=1)
     drive_efficiency: float = quantity("-", "rotor shaft power over electric power", 0.75, gt=0, le=1)
+    figure_of_merit: float = quantity("-", "ideal over shaft power, of rotors", 0.6, gt=0, le=1)
     avionics_power: float = quantity("W", "drawn by everything but the rotors", 5.0, ge=0, le=1e4)
 
 

@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.magnetic import field_at
-from sitl_bridge.plant.battery import BatteryReading, drained, electric_power, reading
+from sitl_bridge.plant.battery import (
+    BatteryReading,
+    drained,
+    electric_power,
+    power_coefficients,
+    reading,
+)
 from sitl_bridge.plant.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.dynamics import WORK_ROWS, advance, set_rotors
 from sitl_bridge.plant.parameters import parameters, step_count
@@ -65,6 +71,7 @@ class World:
         self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
         self.measurement = self.instruments.reading
         self._period = 1.0 / rate_hz
+        self._drain = power_coefficients(vehicle, vehicle.battery) if vehicle.battery else ()
         self._force = HeldForce(vehicle.disturbance, self.step, seed)
         self._wind = HeldWind(vehicle, self.step, seed)
         self._controls = np.zeros(MOST_ROTORS)
@@ -178,7 +185,7 @@ class World:
         if battery is None:
             return None
         speeds = self.inner[: len(self.vehicle.rotors)].tolist()
-        now = reading(battery, self._charge, electric_power(self.vehicle, battery, speeds))
+        now = reading(battery, self._charge, electric_power(battery, self._drain, speeds))
         self._charge = drained(battery, self._charge, now.current, duration)
         return now
 

@@ -20,7 +20,7 @@ HOVER_THRUST = (1.5 + 0.3) * 9.81  # N, iris with its load
 LARGEST_THRUST = 4 * 5.84e-6 * 1100.0**2  # N
 HOVER = (HOVER_THRUST / LARGEST_THRUST) ** 0.5
 # Of airframe 10016 in body FRD: roll is -y T, pitch x T, yaw 0.05 T, plus for CCW.
-ROTORS = np.array([(0.15, 0.25, 1), (-0.15, -0.19, 1), (0.15, -0.25, -1), (-0.15, 0.19, -1)])
+ROTORS = np.array([(0.1515, 0.245, 1), (-0.1515, -0.1875, 1), (0.1515, -0.245, -1), (-0.1515, 0.1875, -1)])
 INERTIA = np.array([0.029125, 0.029125, 0.055225])
 PERIOD_US = 4000
 Attach = Callable[..., Px4]

@@ -8,9 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sitl_bridge.plant.battery import drained, electric_power, reading
+from sitl_bridge.plant.battery import (
+    drained,
+    electric_power,
+    power_coefficients,
+    reading,
+    shaft_coefficient,
+)
 from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Battery, hover_rotor_speeds, load_vehicle
+from sitl_bridge.vehicle import Battery, Vehicle, hover_rotor_speeds, load_vehicle
 from tests.plant.flying import Flight, flight
 
 BATTERY = Battery(cells=4, capacity=5.0, resistance=0.05)
@@ -74,12 +80,62 @@ def test_battery_empties_in_its_time() -> None:
     assert drained(BATTERY, 0.01, 1000.0, 10.0) == 0.0
 
 
-def test_hover_power_is_torque_times_speed() -> None:
-    vehicle = load_vehicle("iris")
+def hover_power(vehicle: Vehicle, load: bool = True) -> float:
+    """W in hover, with the load or after it was dropped."""
     assert vehicle.battery is not None
-    speeds = hover_rotor_speeds(vehicle)
-    shaft = 4 * 2.92e-7 * speeds[0] ** 3
-    assert electric_power(vehicle, vehicle.battery, speeds) == pytest.approx(shaft / 0.75 + 5.0)
+    share = 1.0 if load else vehicle.airframe.mass / (vehicle.airframe.mass + vehicle.load.mass)
+    speeds = [speed * math.sqrt(share) for speed in hover_rotor_speeds(vehicle)]
+    return electric_power(vehicle.battery, power_coefficients(vehicle, vehicle.battery), speeds)
+
+
+@pytest.mark.parametrize("name", ["iris", "heavy"])
+def test_hover_takes_the_ideal_power_over_the_efficiencies(name: str) -> None:
+    """Momentum theory: T sqrt(T / 2 rho A) is the least that any rotor of that disc can hover on."""
+    vehicle = load_vehicle(name)
+    battery = vehicle.battery
+    assert battery is not None
+    density = 1.225 * (1.0 - 0.0065 * 488.0 / 288.15) ** 4.2559  # ISA at home
+    ideal = 0.0
+    for rotor, speed in zip(vehicle.rotors, hover_rotor_speeds(vehicle), strict=True):
+        assert rotor.diameter is not None
+        thrust, disc = rotor.thrust_coefficient * speed**2, math.pi * (rotor.diameter / 2.0) ** 2
+        ideal += thrust * math.sqrt(thrust / (2.0 * density * disc))
+    shaft = (hover_power(vehicle) - battery.avionics_power) * battery.drive_efficiency
+    assert shaft * battery.figure_of_merit == pytest.approx(ideal, rel=1e-3)
+
+
+def test_without_a_disc_power_is_torque_times_speed() -> None:
+    rotor = load_vehicle("paper").rotors[0]
+    assert rotor.diameter is None
+    assert shaft_coefficient(rotor, 0.6, 1.2) == rotor.torque_coefficient
+
+
+def test_hover_draws_what_such_vehicles_draw() -> None:
+    """A 1.5 kg quadrotor on 3S takes about 10 A/kg; the Iris+ was sold with 16 to 22 minutes."""
+    vehicle = load_vehicle("iris")
+    battery = vehicle.battery
+    assert battery is not None
+    power = hover_power(vehicle, load=False)
+    now = reading(battery, 1.0, power)
+    assert 10.0 < now.current < 18.0
+    assert 0.2 < battery.cells * battery.full_cell_voltage - now.voltage < 0.6
+    remaining, minutes = 1.0, 0.0
+    while remaining > 0.0:
+        remaining = drained(battery, remaining, reading(battery, remaining, power).current, 6.0)
+        minutes += 0.1
+    assert 16.0 < minutes < 22.0
+    assert 15.0 < reading(battery, 1.0, hover_power(vehicle)).current < 22.0
+
+
+def test_power_grows_as_weight_to_the_three_halves() -> None:
+    vehicle = load_vehicle("heavy")
+    assert vehicle.battery is not None
+    idle = vehicle.battery.avionics_power
+    ratio = (hover_power(vehicle) - idle) / (hover_power(vehicle, load=False) - idle)
+    assert ratio == pytest.approx((27.5 / 19.5) ** 1.5, rel=1e-6)
+
+
+def test_the_world_drains_its_battery() -> None:
     world = World(load_vehicle("iris", ["initial.start=hover"]), 250.0, 1)
     first = world.battery(0.0)
     assert first is not None

@@ -1,4 +1,4 @@
-"""Barometer and thermometer: the International Standard Atmosphere (ISO 2533), troposphere."""
+"""Barometer, thermometer, air density: the International Standard Atmosphere (ISO 2533), troposphere."""
 
 from __future__ import annotations
 
@@ -25,3 +25,8 @@ def air_temperature(altitude: Any) -> Any:
 def air_pressure(altitude: Any) -> Any:
     """Pa at an altitude in m above mean sea level."""
     return SEA_LEVEL_PRESSURE * (air_temperature(altitude) / SEA_LEVEL_TEMPERATURE) ** PRESSURE_EXPONENT
+
+
+def air_density(altitude: float) -> float:
+    """kg/m³ at an altitude in m above mean sea level."""
+    return float(air_pressure(altitude) / (GAS_CONSTANT * air_temperature(altitude)))
