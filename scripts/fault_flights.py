@@ -3,8 +3,8 @@
     python scripts/fault_flights.py
 
 Plant and autopilot as they are, on a clock of their own instead of a wall clock, in one process; `iris` at
-250 Hz, hovering with its load in moderate turbulence (always the same), fed back truth, one fault from
-t = 5 s on.
+250 Hz, hovering with its load in moderate turbulence (always the same), fed back the estimate from its
+sensors, one fault from t = 5 s on.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from controller.autopilot import Autopilot  # noqa: E402
+from controller.estimate_feedback import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
 from controller.reference import setpoint  # noqa: E402
 from sitl_bridge.plant.faults import Faults  # noqa: E402
@@ -37,7 +38,15 @@ START = ["initial.start=hover", "initial.load_position=[0.0, 0.0, 20.0]", "air.t
 FLIGHTS = {
     "none": {},
     "accelerometer stuck": {"sensor": [{"sensor": "accelerometer", "failure": "stuck", "at": AT}]},
+    "accelerometer wrong": {"sensor": [{"sensor": "accelerometer", "failure": "wrong", "at": AT}]},
+    "gyroscope stuck": {"sensor": [{"sensor": "gyroscope", "failure": "stuck", "at": AT}]},
+    "magnetometer off": {"sensor": [{"sensor": "magnetometer", "failure": "off", "at": AT}]},
+    "magnetometer wrong": {"sensor": [{"sensor": "magnetometer", "failure": "wrong", "at": AT}]},
+    "barometer off": {"sensor": [{"sensor": "barometer", "failure": "off", "at": AT}]},
+    "barometer wrong": {"sensor": [{"sensor": "barometer", "failure": "wrong", "at": AT}]},
     "GPS lost": {"sensor": [{"sensor": "gps", "failure": "lost", "at": AT}]},
+    "GPS lost for 5 s": {"sensor": [{"sensor": "gps", "failure": "lost", "at": AT, "duration": 5.0}]},
+    "GPS wrong": {"sensor": [{"sensor": "gps", "failure": "wrong", "at": AT}]},
     "rotor 1 at 90 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.9, "at": AT}]},
     "rotor 1 at 70 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.7, "at": AT}]},
     "rotor 1 off for 0.1 s": {"rotor": [{"rotor": 1, "thrust": 0.0, "at": AT, "duration": 0.1}]},
@@ -55,13 +64,17 @@ FLIGHTS = {
     "link: stall of 0.1 s": {"link": [{"failure": "stall", "at": AT, "duration": 0.1}]},
     "link: stall of 1 s": {"link": [{"failure": "stall", "at": AT, "duration": 1.0}]},
 }
-DRAWN = (
-    "rotor 1 at 90 % thrust",
-    "load twice as heavy",
-    "gust of 8 m/s, 2 s",
-    "cable snaps",
-    "link: stall of 0.1 s",
-)
+DRAWN = {
+    "sensors": ("none", "accelerometer wrong", "gyroscope stuck", "barometer wrong", "GPS lost", "GPS wrong"),
+    "the rest": (
+        "rotor 1 at 70 % thrust",
+        "rotor 1 off for 0.1 s",
+        "cable snaps",
+        "gust of 8 m/s, 2 s",
+        "link: 40 ms late each way",
+        "link: stall of 1 s",
+    ),
+}
 
 
 def fly(table: dict[str, list[dict[str, object]]]) -> NDArray[np.float64]:
@@ -74,6 +87,7 @@ def fly(table: dict[str, list[dict[str, object]]]) -> NDArray[np.float64]:
         lambda controls: Autopilot(vehicle, "default", RATE, lambda at: setpoint(at, at), controls),
         0,
         lambda text: None,
+        EstimateFeedback(vehicle, RATE),
     )
     paths = [FaultyPath(faults.link, way, 0) for way in ("to_autopilot", "to_plant")]
     clock.start(0.0)
@@ -106,7 +120,7 @@ def tilt(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def main() -> None:
     """Fly, print, draw."""
-    figure, axes = plt.subplots(figsize=(8, 4.5), layout="constrained")
+    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained", sharey=True)
     print("| fault at 5 s | vehicle strays by, m | largest tilt, deg | 15 s later, m | outcome |")
     print("|---|---|---|---|---|")
     for name, table in FLIGHTS.items():
@@ -117,11 +131,16 @@ def main() -> None:
         outcome = f"on the ground at {rows[-1, 0]:.1f} s" if down else "flies on"
         last = "-" if down else f"{away[-1]:.2f}"
         print(f"| {name} | {away.max():.2f} | {tilt(after).max():.0f} | {last} | {outcome} |", flush=True)
-        if name in DRAWN:
-            axes.plot(after[:, 0], away, label=name)
-    axes.set(xlabel="t / s", ylabel="vehicle from where it hovered / m", xlim=(5, 20), ylim=(0, 2))
-    axes.legend()
-    axes.grid(alpha=0.3)
+        for axes, names in zip(panels, DRAWN.values(), strict=True):
+            if name in names:
+                (line,) = axes.plot(after[:, 0], away, label=name, linewidth=1.2)
+                if down:
+                    axes.plot(after[-1, 0], away[-1], "x", color=line.get_color())
+    for axes, title in zip(panels, DRAWN, strict=True):
+        axes.set(xlabel="t / s", xlim=(AT, END), yscale="log", ylim=(0.02, 200), title=title)
+        axes.legend(fontsize=8, loc="lower center", ncols=2)
+        axes.grid(alpha=0.3, which="both")
+    panels[0].set_ylabel("vehicle from where it hovered / m")
     figure.savefig(ROOT / "docs" / "images" / "faults.png", dpi=110)
 
 
