@@ -45,6 +45,11 @@ PICK_UP_SPEED = 0.4
 """m/s, largest, at which it does."""
 
 
+THRUST_SHARE = 0.85
+"""Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
+LEAST_ACCELERATION = 0.5
+"""m/s², planned with in any case"""
+
 WEIGHTS = {
     "LQR_Q_VPOS": "vehicle_position",
     "LQR_Q_LPOS": "load_position",
@@ -91,6 +96,10 @@ class GuidedAutopilot:
         self._allocation = allocation(vehicle)
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
         self._trajectory = Trajectory(self._period)
+        thrust = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+        weight = vehicle.gravity * (vehicle.airframe.mass + vehicle.load.mass)
+        spare = THRUST_SHARE * thrust / weight - 1.0
+        self._most_acceleration = max(LEAST_ACCELERATION, spare * vehicle.gravity)
         self._work = np.zeros(1, dtype=WORK)
         self._estimate = np.zeros(18)
         self._law: Body | None = None
@@ -230,7 +239,14 @@ class GuidedAutopilot:
 
     def _limits(self) -> Limits:
         p = self.station.parameters
-        return Limits(p["MPC_ACC_HOR"], p["MPC_XY_VEL_MAX"], p["MPC_Z_VEL_MAX_UP"], p["MPC_Z_VEL_MAX_DN"])
+        total = min(p["MPC_ACC_HOR_MAX"], self._most_acceleration)
+        return Limits(
+            min(p["MPC_ACC_HOR"], total),
+            total,
+            p["MPC_XY_VEL_MAX"],
+            p["MPC_Z_VEL_MAX_UP"],
+            p["MPC_Z_VEL_MAX_DN"],
+        )
 
     def _take_designs(self) -> None:
         """New weights are designed for in the background; what is ready is taken between two ticks."""

@@ -16,10 +16,11 @@ from controller.ground import missions as mission_protocol
 from controller.ground import telemetry
 from controller.ground.commands import Command, Memory, Requests, command_of, execute
 from controller.ground.missions import Client, Missions
-from controller.ground.modes import Machine
+from controller.ground.modes import Machine, Stage
 from controller.ground.parameter_file import ParameterFile
 from controller.ground.parameters import Parameters
 from controller.ground.peers import Address, Peer, Peers
+from controller.ground.px4_modes import Mode
 from controller.ground.setpoints import setpoint_of
 from controller.ground.signing import Signing
 from controller.ground.streams import STREAMABLE
@@ -101,7 +102,7 @@ class Station:
         self._stirred = True
         """Something has come in that the mode machine may have to react to"""
         self._next_look = (-math.inf, -math.inf)
-        self._announced = (self.machine.armed, self.machine.mode)
+        self._announced = self._state()
         if storage is not None:
             self._load_parameters(storage)
 
@@ -171,12 +172,7 @@ class Station:
         self._stirred = False
         self._next_look = (view.time + GUIDANCE_PERIOD, now + GUIDANCE_PERIOD)
         target = machine.update(view, now, self.peers.last_station)
-        state = (self.machine.armed, self.machine.mode)
-        if state != self._announced:
-            self._announced = state
-            self._due = now
-            for peer in self.peers:
-                peer.streams.hasten(_ON_CHANGE, now)
+        self._hasten_state(now)
         if self.machine.notices:
             notices, self.machine.notices = self.machine.notices, []
             for notice in notices:
@@ -187,6 +183,19 @@ class Station:
             for seq in reached:
                 self._broadcast(mavlink.MAVLink_mission_item_reached_message(seq), now)
         return target
+
+    def _state(self) -> tuple[bool, Mode, Stage]:
+        return self.machine.armed, self.machine.mode, self.machine.stage
+
+    def _hasten_state(self, now: float) -> bool:
+        """Let everybody know at once, if what HEARTBEAT and the like say has changed."""
+        if self._state() == self._announced:
+            return False
+        self._announced = self._state()
+        self._due = now
+        for peer in self.peers:
+            peer.streams.hasten(_ON_CHANGE, now)
+        return True
 
     @property
     def armed(self) -> bool:
@@ -362,6 +371,9 @@ class Station:
             self._memory.store(key, sequence, confirmation, verdict, now)
             if not verdict.ok:
                 self._say(peer, Notice(WARNING, verdict.text), now)
+            # A client that waits for a mode after its command is accepted must not see the old one then.
+            if self._hasten_state(now):
+                self._send_streams(now)
         ack = mavlink.MAVLink_command_ack_message(
             command.number, verdict.result, 0, 0, frame.system, frame.component
         )
