@@ -12,12 +12,14 @@ from typing import Protocol
 import numpy as np
 from pymavlink.dialects.v20 import common
 
+from controller import handover
 from controller.allocation import allocation
 from controller.designs import EVEN, Emphasis, guided_designs
 from controller.ground.station import Station
 from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Terminate
 from controller.ground.verdict import INFO, WARNING, Notice
 from controller.ground.view import VehicleView
+from controller.ground.wire import decoded
 from controller.law import WORK, Design, Memory, engaged_memory
 from controller.state import (
     EULER_ANGLES,
@@ -30,7 +32,7 @@ from controller.state import (
 from controller.step import control_step
 from controller.trajectory import Limits, Trajectory
 from sitl_bridge.frames import Triple, quaternion_from_euler
-from sitl_bridge.mavlink.framing import Frame, decode
+from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle import Vehicle
 
 IDLE_COMMAND = 0.08
@@ -135,7 +137,9 @@ class GuidedAutopilot:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.relay(frame, now)
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
-            battery = decode(frame)
+            battery = decoded(frame)
+            if battery is None:
+                return
             measured = [volts for volts in battery.voltages if volts != UNMEASURED_CELL]
             self._view.battery_voltage = sum(measured) * 1e-3 if measured else math.nan
             current, remaining = battery.current_battery, battery.battery_remaining
@@ -219,10 +223,7 @@ class GuidedAutopilot:
         before = self._memory if self._law is not None else None
         self._trajectory.start(estimate[position], estimate[velocity], yaw)
         if before is not None and self._law is not None:
-            # Deviations from u* of the law before, seen from the new law's u*.
-            change = self._designs[self._law]["hover_wrench"][0] - self._designs[body]["hover_wrench"][0]
-            memory["rotors"][0] = before["rotors"][0] + change
-            memory["past"][0] = before["past"][0] + change
+            handover.other_body(self._designs[self._law], self._designs[body], before, memory)
         self._law, self._memory = body, memory
         self._step = self._bound(body)
 
@@ -260,7 +261,10 @@ class GuidedAutopilot:
         if isinstance(result, str):
             self.station.announce(Notice(WARNING, f"Weights not used: {result}"), self._heard)
             return
-        self._designs = dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
-        self.station.announce(Notice(INFO, "New weights fly"), self._heard)
+        before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
         if self._law is not None:
+            yaw = float(self._trajectory.path["yaw"][0])
+            after = self._designs[self._law]
+            handover.other_gains(before[self._law], after, self._memory, self._work, yaw)
             self._step = self._bound(self._law)
+        self.station.announce(Notice(INFO, "New weights fly"), self._heard)

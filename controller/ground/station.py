@@ -27,8 +27,8 @@ from controller.ground.streams import STREAMABLE
 from controller.ground.targets import Target
 from controller.ground.verdict import INFO, OK, WARNING, Notice, Verdict, deny, not_now
 from controller.ground.view import LOAD_COMPONENT, VEHICLE_COMPONENT, Profile, VehicleView
-from controller.ground.wire import AvailableModes, CurrentMode, Packed, packed
-from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame, decode, split
+from controller.ground.wire import AvailableModes, CurrentMode, Packed, decoded, packed
+from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame, split
 
 STATION_LINK, ONBOARD_LINK = 0, 1
 GUIDANCE_PERIOD = 0.02
@@ -132,9 +132,8 @@ class Station:
             self.dropped += 1
             return
         peer.hear(frame, now)
-        try:
-            message = decode(frame)
-        except (mavlink.MAVError, struct.error, ValueError):
+        message = decoded(frame)
+        if message is None:
             self.dropped += 1
             return
         number = frame.message_id  # not message.id: some messages have a field of that name
@@ -151,8 +150,8 @@ class Station:
     def relay(self, frame: Frame, now: float) -> None:
         """The load's own message, from the plant's link: it is passed on as from the load."""
         if frame.system == self.profile.load_system and frame.message_id in _LOAD_MESSAGES:
-            message = decode(frame)
-            as_packed = packed(message)
+            message = decoded(frame)
+            as_packed = None if message is None else packed(message)
             if as_packed is not None:
                 self._load[frame.message_id] = (as_packed, now)
                 self._due = now

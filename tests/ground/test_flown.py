@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.wire import frame
 from controller.guided import WEIGHTS
+from sitl_bridge.mavlink.framing import Frame, split
 from tests.ground.flown import Flown
 from tests.ground.rig import NAN, Client
 from tests.loopback import swing
@@ -99,3 +101,33 @@ def test_whatever_weights_are_set_in_flight_it_goes_on_flying(factor: float) -> 
         flight.run(1.5)
         assert flight.station.machine.mode.name == "HOLD", (name, client.texts())
         assert np.ptp(flight.flown(1.0).load, axis=0).max() < 0.1, name
+
+
+def test_weights_change_without_a_jolt_while_the_wind_pushes() -> None:
+    """The integral holds against the wind; with ten times its weight it does so with another number."""
+    flight = Flown("air.wind=[6.0, 2.0, 0.0]")
+    client = flight.client()
+    flight.take_off(client)
+    flight.run(25.0)
+    for name, factor in (("LQR_Q_INT", 10.0), ("LQR_R_MOMENT", 5.0), ("LQR_Q_ATT", 0.2)):
+        set_parameter(client, name, factor)
+        flight.run(3.0)
+        assert "New weights fly" in client.texts()[-1]
+        assert np.ptp(flight.flown(3.0).load, axis=0).max() < 0.02, name
+
+
+def frame_of(number: int, payload: bytes, system: int) -> Frame:
+    """A frame with a good checksum around any payload."""
+    raw = frame(payload, number, mavlink.mavlink_map[number].crc_extra, 0, system, 35, False)
+    return split(raw).frames[0]
+
+
+def test_nothing_that_the_plant_says_raises() -> None:
+    flight, _ = flying()
+    chance = random.Random(1)
+    for number in (mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, *sorted(mavlink.mavlink_map)):
+        for system in (1, 101, 7):
+            payload = chance.randbytes(chance.randrange(1, 255))
+            flight.pilot.hear(frame_of(number, payload, system), flight.now)
+    flight.run(1.0)
+    assert flight.station.machine.mode.name in ("HOLD", "RTL", "LAND")  # a battery at any charge may be told
