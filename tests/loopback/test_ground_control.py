@@ -174,6 +174,8 @@ def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
     [
         ("connect.py", "mavsdk"),
         ("mission.py", "mavsdk"),
+        ("parameter_sweep.py", "mavsdk"),
+        ("figure_eight.py", "mavproxy"),
     ],
 )
 def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
@@ -187,7 +189,21 @@ def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
         )
         assert done.returncode == 0, done.stdout + done.stderr + vehicle.log.read_text()[-2000:]
         assert "landed" in done.stdout
-    assert_landed(vehicle)
+    flown = assert_landed(vehicle)
+    if script == "figure_eight.py":
+        assert_figure_eight(flown)
+
+
+def assert_figure_eight(flown: swing.Flown) -> None:
+    """The load was on the curve at last, all over it, though joining it took some seconds."""
+    phase = np.linspace(0.0, 2.0 * math.pi, 2000)
+    curve = np.stack([1.5 * np.sin(2.0 * phase), 3.0 * np.sin(phase), np.full_like(phase, 3.0)], axis=1)
+    up = flown.time[np.abs(flown.load[:, 2] - 3.0) < 0.05]
+    load = flown.between(float(up[0]) + 3.0, float(up[-1]) - 4.0).load[::25]
+    away = np.linalg.norm(load[:, None] - curve, axis=2).min(axis=1)
+    print(f"figure eight: the load {away.max():.3f} m from the curve at most")
+    assert away.max() < 0.1
+    assert load[:, 1].min() < -2.9
 
 
 def test_the_fixture_example_runs_as_a_plugin(tmp_path: Path) -> None:
