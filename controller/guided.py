@@ -136,6 +136,8 @@ class GuidedAutopilot:
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.relay(frame, now)
+        if frame.message_id == common.MAVLINK_MSG_ID_COMMAND_ACK:
+            self.station.hear_plant(frame, now)
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
             battery = decoded(frame)
             if battery is None:

@@ -47,6 +47,7 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("CAL_GYRO0_ID", 1310988, 1, 2147483647, "", "Gyroscope that is calibrated (not 0); no effect"),
     Parameter("CAL_ACC0_ID", 1310988, 1, 2147483647, "", "Accelerometer that is calibrated (not 0); no effect"),
     Parameter("CAL_MAG0_ID", 197388, 1, 2147483647, "", "Magnetometer that is calibrated (not 0); no effect"),
+    Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "Whether MAV_CMD_INJECT_FAILURE is passed on to the plant", ((0, "refused"), (1, "passed on"))),
     Parameter("BAT1_N_CELLS", 4, 1, 24, "", "Cells in series; shown in BATTERY_STATUS"),
     Parameter("BAT1_V_CHARGED", 4.05, 3.0, 4.5, "V", "Voltage of a full cell"),
     Parameter("BAT1_V_EMPTY", 3.6, 2.5, 4.0, "V", "Voltage of an empty cell under load"),
@@ -74,7 +75,7 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("COM_ARM_SPEED", 0.5, 0.05, 5.0, "m/s", "Largest speed at which the vehicle counts as at rest and can be armed"),
     Parameter("COM_ARM_BAT_MIN", 0.2, -1.0, 1.0, "", "Least remaining charge (0..1) to arm; negative: no check"),
     # Failsafes; docs/failsafes.md
-    Parameter("COM_HIL_LOSS_T", 0.5, 0.05, 30.0, "s", "Without HIL_SENSOR for so long, the link to the plant is lost"),
+    Parameter("COM_HIL_LOSS_T", 2.0, 0.05, 30.0, "s", "Without HIL_SENSOR for so long, the link to the plant is lost"),
     Parameter("COM_HIL_LOSS_ACT", 1, 0, 4, "", "Reaction to a lost link to the plant", _HIL_ACTIONS),
     Parameter("COM_OF_LOSS_T", 1.0, 0.05, 60.0, "s", "Without a set-point for so long, offboard control is lost"),
     Parameter("COM_OBL_RC_ACT", 5, 3, 6, "", "Reaction to lost offboard set-points", _OFFBOARD_ACTIONS),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -20,6 +20,7 @@ from controller.ground.modes import Machine, Stage
 from controller.ground.parameter_file import ParameterFile
 from controller.ground.parameters import Parameters
 from controller.ground.peers import Address, Peer, Peers
+from controller.ground.plant_commands import Answer, PlantCommands
 from controller.ground.px4_modes import Mode
 from controller.ground.setpoints import setpoint_of
 from controller.ground.signing import Signing
@@ -93,7 +94,10 @@ class Station:
         """Datagrams and frames that were not taken"""
         self._storage = storage
         self._signing = signing
+        self.plant_commands = PlantCommands()
         self._memory = Memory()
+        self._under_way: set[Hashable] = set()
+        """Commands whose verdict is still to come"""
         self._load: dict[int, tuple[Packed, float]] = {}
         self._load_sent: dict[tuple[Address, int], float] = {}
         self._housekeeping = now
@@ -155,6 +159,12 @@ class Station:
             if as_packed is not None:
                 self._load[frame.message_id] = (as_packed, now)
                 self._due = now
+
+    def hear_plant(self, frame: Frame, now: float) -> None:
+        """The plant's COMMAND_ACK to what was passed on to it."""
+        message = decoded(frame)
+        if message is not None:
+            self.plant_commands.heard(message, now)
 
     # The control loop
 
@@ -364,19 +374,32 @@ class Station:
         key = (sender, message.id, to_load, command.number, numbers)
         confirmation = getattr(message, "confirmation", 0)
         sequence = frame.raw[4 if frame.version == 2 else 2]
-        verdict = self._memory.recall(key, sequence, confirmation, now)
-        if verdict is None:
-            verdict = execute(command, self.machine, _PeerRequests(self, peer, now), now)
+
+        def acknowledge(verdict: Verdict, now: float) -> None:
+            ack = mavlink.MAVLink_command_ack_message
+            message = ack(command.number, verdict.result, 0, 0, frame.system, frame.component)
+            self._send(peer, message, now, of_load=to_load)
+
+        def finish(verdict: Verdict, now: float) -> None:
+            self._under_way.discard(key)
             self._memory.store(key, sequence, confirmation, verdict, now)
             if not verdict.ok:
                 self._say(peer, Notice(WARNING, verdict.text), now)
             # A client that waits for a mode after its command is accepted must not see the old one then.
             if self._hasten_state(now):
                 self._send_streams(now)
-        ack = mavlink.MAVLink_command_ack_message(
-            command.number, verdict.result, 0, 0, frame.system, frame.component
-        )
-        self._send(peer, ack, now, of_load=to_load)
+            acknowledge(verdict, now)
+            self._due = now
+
+        before = self._memory.recall(key, sequence, confirmation, now)
+        if before is not None:
+            acknowledge(before, now)
+        elif key not in self._under_way:
+            verdict = execute(command, self.machine, _PeerRequests(self, peer, now, finish), now)
+            if verdict is None:
+                self._under_way.add(key)
+            else:
+                finish(verdict, now)
 
     def _old_set_mode(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         """SET_MODE, which some clients still send instead of DO_SET_MODE."""
@@ -384,8 +407,8 @@ class Station:
             return
         main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
         command = Command(176, message.base_mode, main, sub, *(math.nan,) * 4, False, "", False)
-        verdict = execute(command, self.machine, _PeerRequests(self, peer, now), now)
-        if not verdict.ok:
+        verdict = execute(command, self.machine, _PeerRequests(self, peer, now, lambda *_: None), now)
+        if verdict is not None and not verdict.ok:
             self._say(peer, Notice(WARNING, verdict.text), now)
 
     def _parameter_list(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
@@ -505,8 +528,9 @@ class Station:
 class _PeerRequests(Requests):
     """What a command can ask for, on behalf of the peer that sent it."""
 
-    def __init__(self, station: Station, peer: Peer, now: float) -> None:
+    def __init__(self, station: Station, peer: Peer, now: float, finish: Answer) -> None:
         self._station, self._peer, self._now = station, peer, now
+        self._finish = finish
 
     def send_message(self, message_id: int, index: float) -> bool:
         """Send one message once; False if there is no such message."""
@@ -541,6 +565,10 @@ class _PeerRequests(Requests):
     def storage(self, action: float) -> Verdict:
         """Load, save or reset the parameters."""
         return self._station.store_parameters(action)
+
+    def inject_failure(self, parameters: tuple[float, ...]) -> None:
+        """Pass MAV_CMD_INJECT_FAILURE on to the plant."""
+        self._station.plant_commands.inject_failure(parameters, self._now, self._finish)
 
     def say(self, text: str) -> None:
         """A STATUSTEXT that comes with an acceptance."""
