@@ -47,6 +47,8 @@ PICK_UP_SPEED = 0.4
 """m/s, largest, at which it does."""
 
 
+LOST_LOAD = 1.1
+"""Of the longest cable, distance at which the load is not on it any more."""
 THRUST_SHARE = 0.85
 """Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
 LEAST_ACCELERATION = 0.5
@@ -109,6 +111,8 @@ class GuidedAutopilot:
         self._memory: Memory = engaged_memory(np.zeros(3))
         self._step: Callable[[], int] = self._bound(Body.VEHICLE)  # compiled code is loaded now
         ground = vehicle.ground
+        # A cable that is stretched by all that the rotors can pull is as long as one can be.
+        self._longest_cable = LOST_LOAD * (vehicle.cable.rest_length + thrust / vehicle.cable.stiffness)
         self._vehicle_rest = self._load_rest = -math.inf
         if ground is not None:
             self._vehicle_rest = ground.height - min(leg[2] for leg in vehicle.airframe.legs)
@@ -135,9 +139,7 @@ class GuidedAutopilot:
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
-        self.station.relay(frame, now)
-        if frame.message_id == common.MAVLINK_MSG_ID_COMMAND_ACK:
-            self.station.hear_plant(frame, now)
+        self.station.hear_plant(frame, now)
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
             battery = decoded(frame)
             if battery is None:
@@ -178,7 +180,11 @@ class GuidedAutopilot:
         view.position, view.load_position = position, load
         view.velocity, view.load_velocity = (x[6], x[7], x[8]), (x[9], x[10], x[11])
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
-        view.cable_taut = math.dist(position, load) >= self._vehicle.cable.rest_length
+        length = math.dist(position, load)
+        view.cable_taut = length >= self._vehicle.cable.rest_length
+        if length > self._longest_cable and view.load_attached:
+            view.load_attached = False
+            self.station.announce(Notice(WARNING, "The load is lost: flying without it"), self._heard)
         view.vehicle_on_ground = position[2] < self._vehicle_rest + CONTACT_MARGIN
         view.load_on_ground = load[2] < self._load_rest + CONTACT_MARGIN
         view.hil_age = 0.0

@@ -131,3 +131,33 @@ def test_nothing_that_the_plant_says_raises() -> None:
             flight.pilot.hear(frame_of(number, payload, system), flight.now)
     flight.run(1.0)
     assert flight.station.machine.mode.name in ("HOLD", "RTL", "LAND")  # a battery at any charge may be told
+
+
+def test_the_plants_battery_brings_it_home() -> None:
+    """BATTERY_STATUS on the HIL link: a warning, then return when critical, land in an emergency."""
+    flight = Flown("battery.capacity=0.5")
+    client = flight.client()
+    flight.take_off(client)
+    flight.run_until(lambda: flight.station.machine.mode.name == "RTL")
+    assert any("low, warning only" in text for text in client.texts())
+    assert any("critical, returning" in text for text in client.texts())
+    flight.run_until(lambda: not flight.station.armed)
+    remaining = [m.battery_remaining for m in client.got("BATTERY_STATUS")][1:]  # the first: unknown
+    assert remaining == sorted(remaining, reverse=True)
+    assert remaining[-1] < 8
+    assert client.command(400, 1).result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+    assert "COM_ARM_BAT_MIN" in client.texts()[-1]
+
+
+def test_it_flies_on_when_the_cable_snaps() -> None:
+    flight, client = flying()
+    flight.run(1.0)
+    flight.simulation.world.release_cable()
+    flight.run(8.0)
+    assert any("The load is lost" in text for text in client.texts())
+    assert flight.station.machine.mode.name == "HOLD", client.texts()
+    still = flight.flown(1.0)
+    assert np.ptp(still.vehicle, axis=0).max() < 0.1
+    assert client.command(21).result == 0
+    flight.run_until(lambda: not flight.station.armed)
+    assert flight.flown(0.1).vehicle[-1, 2] < 0.15

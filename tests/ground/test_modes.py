@@ -509,7 +509,7 @@ def test_link_to_the_plant_lost_and_back(action: int, expected: str) -> None:
     client.command(300, 0, 0)
     rig.run(0.5)
     rig.frozen = True
-    rig.view.hil_age = 1.0
+    rig.view.hil_age = rig.station.parameters["COM_HIL_LOSS_T"] + 0.1
     rig.run(1.0)
     assert any("link to the plant lost" in text for text in client.texts())
     rig.frozen = False

@@ -178,7 +178,9 @@ def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
         ("figure_eight.py", "mavproxy"),
     ],
 )
-def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
+def test_the_examples_fly(
+    script: str, link: str, tmp_path: Path, record_property: pytest.RecordProperty
+) -> None:
     with flying_vehicle(tmp_path) as vehicle:
         done = subprocess.run(
             [sys.executable, str(EXAMPLES / script), getattr(vehicle, link)],
@@ -192,6 +194,27 @@ def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
     flown = assert_landed(vehicle)
     if script == "figure_eight.py":
         assert_figure_eight(flown)
+    elif script == "mission.py":
+        report_mission(flown, record_property)
+
+
+def report_mission(flown: swing.Flown, record_property: pytest.RecordProperty) -> None:
+    """Three way-points, 5 m apart: within half a metre of each, which is their acceptance radius."""
+    corners = np.array([(0, 5), (5, 5), (5, 0)], dtype=float)
+    up = flown.time[flown.vehicle[:, 2] > 4.5]
+    flown = flown.between(float(up[0]), float(up[-1]))
+    begin = int(np.argmin(np.linalg.norm(flown.vehicle[:, :2] - corners[0], axis=1)))
+    passed = {
+        body: float(swing.overshoots(positions[begin:, :2], corners).max())
+        for body, positions in (("vehicle", flown.vehicle), ("load", flown.load))
+    }
+    largest = float(swing.swing(flown).max())
+    for body, overshoot in passed.items():
+        record_property(f"{body}_overshoot_m", overshoot)
+    record_property("largest_swing_deg", largest)
+    print(f"mission: {passed} m past a way-point at most; swing {largest:.1f} deg at most")
+    assert max(passed.values()) < 0.5
+    assert largest < 20.0
 
 
 def assert_figure_eight(flown: swing.Flown) -> None:
