@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -17,7 +16,8 @@ from controller.ground.view import profile_of
 from controller.guided import GuidedAutopilot
 from controller.hil.session import new_session
 from controller.law import Design
-from sitl_bridge.plant.answers import Answer, AnswerReader
+from sitl_bridge.plant.lockstep import Lockstep
+from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.state import LOAD_POSITION as PLANT_LOAD
 from sitl_bridge.plant.state import VEHICLE_POSITION as PLANT_VEHICLE
@@ -26,7 +26,6 @@ from tests.ground.rig import Client
 from tests.loopback import swing
 
 RATE_HZ = 250.0
-STOPPED = [math.nan] * 16
 Array = NDArray[np.float64]
 
 
@@ -66,7 +65,8 @@ class Flown:
         """Called before each tick"""
         self.simulation = Simulation(self.vehicle, RATE_HZ, seed=1)
         self.session = new_session(self._autopilot, 0, lambda text: None)
-        self._answers = AnswerReader(0)
+        self.clock = Lockstep(self.simulation, Notices(lambda text: None), 0)
+        self.clock.start(self.now)
         self._track: list[list[float]] = []
 
     def _autopilot(self, controls: Array) -> GuidedAutopilot:
@@ -83,30 +83,18 @@ class Flown:
         """One tick in lockstep."""
         self.now += self.simulation.period
         self.every_tick()
-        self.session.receive(self.simulation.datagram(), self.now)
-        for datagram in self.session.to_send(self.now):
-            received = self._answers.read(datagram)
-            for frame in received.others:
-                self.simulation.handle(frame)
-            if received.answer is not None:
-                self._advance(received.answer)
+        for tick in self.clock.to_send(self.now):
+            self.session.receive(tick, self.now)
+        for answer in self.session.to_send(self.now):
+            self.clock.receive(answer, self.now)
+        if self.simulation.started:
+            x = self.simulation.world.state
+            self._track.append([self.simulation.scenario_time, *x[PLANT_VEHICLE], *x[PLANT_LOAD]])
         by_address: dict[Address, list[bytes]] = {}
         for address, datagram in self.station.to_send(self.now):
             by_address.setdefault(address, []).append(datagram)
         for client in self.clients:
             client.take(by_address.get(client.address, []))
-
-    def _advance(self, answer: Answer) -> None:
-        plant = self.simulation
-        plant.heard()
-        if answer.armed and not plant.started:
-            plant.begin()
-        if not plant.started:
-            plant.next_tick()
-            return
-        plant.step(answer.controls if answer.armed else STOPPED)
-        x = plant.world.state
-        self._track.append([plant.scenario_time, *x[PLANT_VEHICLE], *x[PLANT_LOAD]])
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
