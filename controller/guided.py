@@ -12,12 +12,14 @@ from typing import Protocol
 import numpy as np
 from pymavlink.dialects.v20 import common
 
+from controller import handover
 from controller.allocation import allocation
 from controller.designs import EVEN, Emphasis, guided_designs
 from controller.ground.station import Station
 from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Terminate
 from controller.ground.verdict import INFO, WARNING, Notice
 from controller.ground.view import VehicleView
+from controller.ground.wire import decoded
 from controller.law import WORK, Design, Memory, engaged_memory
 from controller.state import (
     EULER_ANGLES,
@@ -30,7 +32,7 @@ from controller.state import (
 from controller.step import control_step
 from controller.trajectory import Limits, Trajectory
 from sitl_bridge.frames import Triple, quaternion_from_euler
-from sitl_bridge.mavlink.framing import Frame, decode
+from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle import Vehicle
 
 IDLE_COMMAND = 0.08
@@ -44,6 +46,13 @@ REACH = 0.3
 PICK_UP_SPEED = 0.4
 """m/s, largest, at which it does."""
 
+
+LOST_LOAD = 1.1
+"""Of the longest cable, distance at which the load is not on it any more."""
+THRUST_SHARE = 0.85
+"""Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
+LEAST_ACCELERATION = 0.5
+"""m/s², planned with in any case"""
 
 WEIGHTS = {
     "LQR_Q_VPOS": "vehicle_position",
@@ -91,6 +100,10 @@ class GuidedAutopilot:
         self._allocation = allocation(vehicle)
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
         self._trajectory = Trajectory(self._period)
+        thrust = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+        weight = vehicle.gravity * (vehicle.airframe.mass + vehicle.load.mass)
+        spare = THRUST_SHARE * thrust / weight - 1.0
+        self._most_acceleration = max(LEAST_ACCELERATION, spare * vehicle.gravity)
         self._work = np.zeros(1, dtype=WORK)
         self._estimate = np.zeros(18)
         self._law: Body | None = None
@@ -98,6 +111,8 @@ class GuidedAutopilot:
         self._memory: Memory = engaged_memory(np.zeros(3))
         self._step: Callable[[], int] = self._bound(Body.VEHICLE)  # compiled code is loaded now
         ground = vehicle.ground
+        # A cable that is stretched by all that the rotors can pull is as long as one can be.
+        self._longest_cable = LOST_LOAD * (vehicle.cable.rest_length + thrust / vehicle.cable.stiffness)
         self._vehicle_rest = self._load_rest = -math.inf
         if ground is not None:
             self._vehicle_rest = ground.height - min(leg[2] for leg in vehicle.airframe.legs)
@@ -124,9 +139,11 @@ class GuidedAutopilot:
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
-        self.station.relay(frame, now)
+        self.station.hear_plant(frame, now)
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
-            battery = decode(frame)
+            battery = decoded(frame)
+            if battery is None:
+                return
             measured = [volts for volts in battery.voltages if volts != UNMEASURED_CELL]
             self._view.battery_voltage = sum(measured) * 1e-3 if measured else math.nan
             current, remaining = battery.current_battery, battery.battery_remaining
@@ -163,7 +180,11 @@ class GuidedAutopilot:
         view.position, view.load_position = position, load
         view.velocity, view.load_velocity = (x[6], x[7], x[8]), (x[9], x[10], x[11])
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
-        view.cable_taut = math.dist(position, load) >= self._vehicle.cable.rest_length
+        length = math.dist(position, load)
+        view.cable_taut = length >= self._vehicle.cable.rest_length
+        if length > self._longest_cable and view.load_attached:
+            view.load_attached = False
+            self.station.announce(Notice(WARNING, "The load is lost: flying without it"), self._heard)
         view.vehicle_on_ground = position[2] < self._vehicle_rest + CONTACT_MARGIN
         view.load_on_ground = load[2] < self._load_rest + CONTACT_MARGIN
         view.hil_age = 0.0
@@ -210,10 +231,7 @@ class GuidedAutopilot:
         before = self._memory if self._law is not None else None
         self._trajectory.start(estimate[position], estimate[velocity], yaw)
         if before is not None and self._law is not None:
-            # Deviations from u* of the law before, seen from the new law's u*.
-            change = self._designs[self._law]["hover_wrench"][0] - self._designs[body]["hover_wrench"][0]
-            memory["rotors"][0] = before["rotors"][0] + change
-            memory["past"][0] = before["past"][0] + change
+            handover.other_body(self._designs[self._law], self._designs[body], before, memory)
         self._law, self._memory = body, memory
         self._step = self._bound(body)
 
@@ -230,7 +248,14 @@ class GuidedAutopilot:
 
     def _limits(self) -> Limits:
         p = self.station.parameters
-        return Limits(p["MPC_ACC_HOR"], p["MPC_XY_VEL_MAX"], p["MPC_Z_VEL_MAX_UP"], p["MPC_Z_VEL_MAX_DN"])
+        total = min(p["MPC_ACC_HOR_MAX"], self._most_acceleration)
+        return Limits(
+            min(p["MPC_ACC_HOR"], total),
+            total,
+            p["MPC_XY_VEL_MAX"],
+            p["MPC_Z_VEL_MAX_UP"],
+            p["MPC_Z_VEL_MAX_DN"],
+        )
 
     def _take_designs(self) -> None:
         """New weights are designed for in the background; what is ready is taken between two ticks."""
@@ -244,7 +269,10 @@ class GuidedAutopilot:
         if isinstance(result, str):
             self.station.announce(Notice(WARNING, f"Weights not used: {result}"), self._heard)
             return
-        self._designs = dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
-        self.station.announce(Notice(INFO, "New weights fly"), self._heard)
+        before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
         if self._law is not None:
+            yaw = float(self._trajectory.path["yaw"][0])
+            after = self._designs[self._law]
+            handover.other_gains(before[self._law], after, self._memory, self._work, yaw)
             self._step = self._bound(self._law)
+        self.station.announce(Notice(INFO, "New weights fly"), self._heard)

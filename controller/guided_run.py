@@ -8,6 +8,8 @@ from controller.ground_link import GroundLink, GroundOptions
 from controller.guided import GuidedAutopilot
 from controller.redesign import DesignProcess
 from controller.state import Array
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.vehicle import Vehicle
 
 LONGEST_WAIT = 0.02
@@ -30,6 +32,7 @@ class Guided:
         self._rate_hz = rate_hz
         self._link = GroundLink(vehicle, instance, options or GroundOptions(), say)
         self._designer = DesignProcess(vehicle, rate_hz)
+        self._packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
         self._pilot: GuidedAutopilot | None = None
 
     def autopilot(self, controls: Array) -> GuidedAutopilot:
@@ -42,6 +45,11 @@ class Guided:
     def next_deadline(self, now: float) -> float:
         """When ground control wants attention, if the plant says nothing before."""
         return min(self._link.station.next_deadline(now), now + LONGEST_WAIT)
+
+    def to_plant(self, now: float) -> list[bytes]:
+        """Datagrams for the plant: commands of ground control that are for it to carry out."""
+        messages = self._link.station.plant_commands.to_plant(now)
+        return [self._packer.pack(message) for message in messages]
 
     def exchange(self, now: float, heard: bool) -> None:
         """Serve ground control; `heard`: whether the plant has said something since the last time."""

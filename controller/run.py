@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from controller.autopilot import Autopilot, PathFrom
+from controller.awake import AwakeClock
 from controller.designs import ON_ESTIMATE
 from controller.hil.session import HilSession, new_session
 from sitl_bridge.mavlink.links import Address, Link, open_link
@@ -106,15 +107,22 @@ def _loop(
     session: HilSession, link: Link, most_steps: int | None, stop: StopRequest, guided: Guided | None
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
+    clock = AwakeClock(time.monotonic())
+    now = time.monotonic()
     while stop.reason is None and (most_steps is None or session.steps < most_steps):
         deadline = session.next_deadline()
-        if guided is not None:
-            deadline = min(deadline, guided.next_deadline(time.monotonic()))
-        received = link.receive(deadline)
-        now = time.monotonic()
+        if guided is None:
+            received = link.receive(deadline)
+            now = time.monotonic()
+        else:
+            until = clock.monotonic(min(deadline, guided.next_deadline(now)))
+            received = link.receive(until)
+            now = clock.now(time.monotonic(), until)
         if received is not None:
             session.receive(received, now)
         for datagram in session.to_send(now):
             link.send(datagram)
         if guided is not None:  # after the answer: the plant does not wait for ground control
             guided.exchange(now, heard=received is not None)
+            for datagram in guided.to_plant(now):
+                link.send(datagram)

@@ -6,6 +6,7 @@ import sys
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.plugins.telemetry import LandedState
 
 
 async def main(connection: str) -> None:
@@ -20,7 +21,7 @@ async def main(connection: str) -> None:
             await asyncio.sleep(0.2)
         await action.arm()
         await action.takeoff()
-        while (await telemetry.flight_mode()).name != "HOLD":
+        while await telemetry.landed_state() != LandedState.IN_AIR:
             await asyncio.sleep(0.2)
         height = (await telemetry.position()).relative_altitude_m
         print(f"flying at {height:.2f} m, the load below")

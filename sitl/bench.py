@@ -19,6 +19,7 @@ from controller.autopilot import Autopilot
 from controller.hil.answers import AnswerWriter
 from controller.reference import setpoint
 from sitl.fly import Pair, watch
+from sitl.ground_bench import ground_figures
 from sitl.roundtrip import round_trip_us
 from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Packer
@@ -139,6 +140,7 @@ def bench(repeats: int) -> dict[str, float]:
         measured["lockstep_tick_estimate_ratio"] = (
             measured["lockstep_tick_us_estimate"] / measured["lockstep_tick_us"]
         )
+        measured |= ground_figures(RATE_HZ)
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():
             samples.setdefault(key, []).append(value)

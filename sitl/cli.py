@@ -418,12 +418,15 @@ def _plant(arguments: argparse.Namespace) -> int:
 def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
+    from sitl.hold import check_design
     from sitl.scenario import GroundControl, Hover
 
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
     reference = scenario.reference if scenario else Hover(kind="hover")
+    if isinstance(reference, GroundControl):
+        check_design(arguments.design)
     options = ControllerOptions(
         vehicle=vehicle,
         hil=_hil_address(arguments, "udpin"),
@@ -446,7 +449,7 @@ def _controller(arguments: argparse.Namespace) -> int:
 
 def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flight import FlightOptions, fly
-    from sitl.hold import ground_arguments, hold
+    from sitl.hold import check_design, ground_arguments, hold
     from sitl.report import table
     from sitl.scenario import GroundControl, load_scenario
 
@@ -476,6 +479,7 @@ def _fly(arguments: argparse.Namespace) -> int:
     stop = StopRequest()
     stop.install()
     if isinstance(scenario.reference, GroundControl):
+        check_design(arguments.design)
         options = replace(options, out=arguments.out, ground=ground_arguments(_ground_options(arguments)))
         failure = hold(options, stop)
         if failure:

@@ -9,6 +9,7 @@ from sitl.flight import FlightOptions
 from sitl.fly import Pair, ProgressLine, watch
 from sitl.scenario import scenario_vehicle
 from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle import DescriptionError
 
 if TYPE_CHECKING:
     from controller.ground_link import GroundOptions
@@ -24,6 +25,14 @@ def ground_arguments(options: GroundOptions) -> list[str]:
         if file is not None:
             arguments += [flag, str(file)]
     return [*arguments, "--expose"] if options.exposed else arguments
+
+
+def check_design(design: str) -> None:
+    """Under ground control there is no choice of a design; raises DescriptionError for one."""
+    if design != "default":
+        raise DescriptionError(
+            "--design", [f"{design} does not fly under ground control; weigh the default by LQR_* parameters"]
+        )
 
 
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:

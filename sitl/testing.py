@@ -30,13 +30,18 @@ class SimulatedVehicle:
     """Connection string for MAVSDK"""
     mavproxy: str
     """`--master` of MAVProxy, and connection string of pymavlink"""
+    ground: str
+    """Where it hears any further ground station, for pymavlink (`udpout:…`)"""
+    companion: str
+    """Where it hears any further companion or MAVSDK script (`udpout://…`)"""
     state_log: Path
     """The simulated truth, a Parquet file; complete when the vehicle is gone"""
     log: Path
     """What the processes said"""
 
 
-def _free_ports(count: int) -> list[int]:
+def free_ports(count: int) -> list[int]:
+    """UDP ports on loopback that nobody has just now."""
     with contextlib.ExitStack() as stack:
         sockets = [
             stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
@@ -58,7 +63,7 @@ def flying_vehicle(
     folder: for logs. arguments: of `sitl fly`; by default plant and controller wait for each other, so that
     a busy machine makes the flight slower but not different. parameters: values to start with.
     """
-    hil, gcs, gcs_peer, onboard, onboard_peer = _free_ports(5)
+    hil, gcs, gcs_peer, onboard, onboard_peer = free_ports(5)
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / "sitl.txt"
     stored = folder / "parameters.json"
@@ -74,6 +79,8 @@ def flying_vehicle(
             yield SimulatedVehicle(
                 f"udpin://127.0.0.1:{onboard_peer}",
                 f"udpin:127.0.0.1:{gcs_peer}",
+                f"udpout:127.0.0.1:{gcs}",
+                f"udpout://127.0.0.1:{onboard}",
                 folder / "state.parquet",
                 log,
             )

@@ -87,6 +87,9 @@ class Requests(Protocol):
     def storage(self, action: float) -> Verdict:
         """Load (0), save (1) or reset (2) the parameters."""
 
+    def inject_failure(self, parameters: tuple[float, ...]) -> None:
+        """Pass MAV_CMD_INJECT_FAILURE on to the plant; its answer is the command's."""
+
     def say(self, text: str) -> None:
         """A STATUSTEXT that comes with an acceptance."""
 
@@ -117,8 +120,8 @@ class Memory:
             self._recent.popitem(last=False)
 
 
-def execute(command: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    """Carry a command out, or say why not."""
+def execute(command: Command, machine: Machine, requests: Requests, now: float) -> Verdict | None:
+    """Carry a command out, or say why not; None: the verdict comes later."""
     handler = _HANDLERS.get(command.number)
     if handler is None:
         entry = mavlink.enums["MAV_CMD"].get(command.number)
@@ -264,7 +267,16 @@ def _calibrate(c: Command, machine: Machine, requests: Requests, now: float) -> 
     return deny("Calibration refused: simulated sensors need none")
 
 
-_Handler = Callable[[Command, Machine, Requests, float], Verdict]
+def _inject_failure(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict | None:
+    if machine.parameters.integer("SYS_FAILURE_EN") != 1:
+        return deny("Failure not injected: set SYS_FAILURE_EN to 1 first")
+    if machine.view is None:
+        return not_now("Failure not injected: no plant yet; start it")
+    requests.inject_failure((c.p1, c.p2, c.p3, c.p4, c.p5, c.p6, c.p7))
+    return None
+
+
+_Handler = Callable[[Command, Machine, Requests, float], Verdict | None]
 _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
     mavlink.MAV_CMD_NAV_TAKEOFF: _takeoff,
@@ -288,6 +300,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_PREFLIGHT_STORAGE: _storage,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
+    mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
 }
 _FOR_LOAD = frozenset((mavlink.MAV_CMD_DO_REPOSITION,))
 

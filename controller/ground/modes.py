@@ -25,6 +25,7 @@ from controller.ground.setpoints import Offboard, Setpoint
 from controller.ground.targets import Body, Follow, Goto, Idle, Target, Terminate
 from controller.ground.verdict import EMERGENCY, INFO, OK, WARNING, Notice, Verdict, deny, not_now
 from controller.ground.view import Profile, VehicleView
+from controller.trajectory import stopping_distance
 from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
 GRAVITY = 9.81
@@ -209,8 +210,10 @@ class Machine:
     def reposition(self, where: Reposition, change_mode: bool) -> Verdict:
         """Go to a point and hold there; what is NaN stays as it is."""
         view = self.view
-        if view is None or not self.flying or self.stage is Stage.ASCENT or self.terminated:
+        if view is None or not self.flying or self.terminated:
             return not_now("Going there refused: not flying; take off first")
+        if self.stage is Stage.ASCENT:
+            return not_now("Going there refused: still taking off; wait until that is done (IN_AIR)")
         if self.stage is Stage.DESCENT and self._descent is not None and not self._descent.hangs:
             return not_now("Going there refused: the load is on the ground; take off again first")
         if not change_mode and self.mode is not Mode.HOLD:
@@ -436,8 +439,11 @@ class Machine:
         position, velocity = (
             (view.load_position, view.load_velocity) if view.load_attached else (view.position, view.velocity)
         )
-        time = min(math.hypot(*velocity) / (2.0 * self.parameters["MPC_ACC_HOR"]), 2.0)
-        x, y, z = (p + v * time for p, v in zip(position, velocity, strict=True))
+        speed = math.hypot(*velocity)
+        if speed == 0.0:
+            return position
+        share = stopping_distance(speed, self.parameters["MPC_ACC_HOR"]) / speed
+        x, y, z = (p + v * share for p, v in zip(position, velocity, strict=True))
         return (x, y, z)
 
     def _hold_target(self) -> Goto:

@@ -8,6 +8,9 @@ from controller.ground.fence import Fence
 from controller.ground.parameters import Parameters
 from controller.ground.view import VehicleView
 
+STALE = 0.5
+"""s, age of the sensor data from which on the vehicle cannot be armed"""
+
 
 def tilt(view: VehicleView) -> float:
     """Angle between the body's z axis and the vertical, rad."""
@@ -20,7 +23,7 @@ def arming_faults(view: VehicleView | None, parameters: Parameters, fence: Fence
     if view is None or math.isinf(view.hil_age):
         return ["no sensor data yet; start the plant"]
     faults = []
-    if view.hil_age > parameters["COM_HIL_LOSS_T"]:
+    if view.hil_age > STALE:
         faults.append(f"no sensor data for {view.hil_age:.1f} s; is the plant running?")
     faults += [f"{name} not ready; wait, or see SYS_STATUS" for name in _unhealthy(view)]
     if not view.in_reach:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from sitl_bridge.mavlink.framing import FLAG_SIGNED, MAGIC_V1, MAGIC_V2
+from sitl_bridge.mavlink.framing import FLAG_SIGNED, MAGIC_V1, MAGIC_V2, Frame, decode
 
 _BITS_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
 LARGEST_V1_ID = 255
@@ -62,6 +62,14 @@ def payload_of(message: Any) -> bytes:
         return bytes(message.pack(None))
     finally:
         del message._pack
+
+
+def decoded(frame: Frame) -> Any | None:
+    """The message of a frame; None if its payload cannot be read."""
+    try:
+        return decode(frame)
+    except (mavlink.MAVError, struct.error, ValueError):
+        return None
 
 
 class Packed(NamedTuple):

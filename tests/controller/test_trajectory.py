@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
+import random
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from controller.allocation import MOST_ROTORS, allocation
 from controller.designs import guided_designs
 from controller.ground.targets import Body, Follow, Goto, Land
 from controller.law import WORK, engaged_memory
+from controller.reference import DERIVATIVES
 from controller.state import LOAD_POSITION, STATE_SIZE, Array
 from controller.step import control_step
-from controller.trajectory import Limits, Trajectory
+from controller.trajectory import MOST_JERK, POLE, Limits, Trajectory, stopping_distance
 from tests.controller.fleet import FLEET
 
 PERIOD = 0.004
-LIMITS = Limits(acceleration=2.0, speed=6.0, up=2.0, down=1.5)
+LIMITS = Limits(acceleration=2.0, total=4.0, speed=6.0, up=2.0, down=1.5)
 NAN3 = (math.nan, math.nan, math.nan)
 
 
@@ -85,6 +88,64 @@ def test_a_trajectory_of_set_points_is_followed_without_lag() -> None:
         place = trajectory.path["motion"][0, 0]
         errors.append(math.hypot(place[0] - 2 * math.cos(w * end), place[1] - 2 * math.sin(w * end)))
     assert max(errors[20 * 12 :]) < 0.03
+
+
+def sharpest(order: int) -> float:
+    """Largest derivative of a motion whose carrot changes its acceleration from one limit to the other.
+
+    The motion's transfer function from the carrot's acceleration is POLE^5 s^(order - 2) / (s + POLE)^5.
+    """
+    numerator = [POLE**DERIVATIVES, *[0.0] * (order - 2)]
+    system = signal.TransferFunction(numerator, np.poly([-POLE] * DERIVATIVES))
+    _, response = signal.step(system, T=np.linspace(0.0, 4.0, 4001))
+    return float(2.0 * LIMITS.acceleration * np.abs(response).max())
+
+
+def test_a_set_point_that_moves_already_is_joined_within_the_limits() -> None:
+    """From rest onto a trajectory at 2 m/s: as sharply as the acceleration limit makes it, and no sharper."""
+    trajectory = started()
+    moved(trajectory, Follow(Body.LOAD, (0.0, 0.0, 0.0), NAN3, NAN3, 0.0, math.nan), 0.5)
+    rows = []
+    for message in range(200):
+        along = Follow(Body.LOAD, (2.0 * message / 20.0, 0.0, 0.0), (2.0, 0.0, 0.0), NAN3, math.nan, math.nan)
+        rows.append(moved(trajectory, along, 0.052 if message % 2 else 0.048))
+    motion = np.concatenate(rows)
+    assert np.abs(motion[:, 2]).max() < LIMITS.acceleration * 1.001
+    for order in (3, 4):
+        assert np.abs(motion[:, order]).max() < sharpest(order) * 1.001
+    np.testing.assert_allclose(motion[-1, 0], (20.0, 0.0, 0.0), atol=0.02)
+    np.testing.assert_allclose(motion[-1, 1], (2.0, 0.0, 0.0), atol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_set_points_jump_about_the_motion_stays_smooth_and_bounded(seed: int) -> None:
+    """The limit is on what set-points ask for and what it takes to get there, both together."""
+    chance, trajectory, longest = random.Random(seed), started(), 80
+
+    def vector(reach: float) -> tuple[float, float, float]:
+        x, y, z = (chance.choice((math.nan, -reach, 0.0, chance.uniform(-reach, reach))) for _ in range(3))
+        return (x, y, z)
+
+    rows = [trajectory.path["motion"][0].copy()]
+    for _ in range(15):
+        follow = Follow(Body.LOAD, vector(30.0), vector(6.0), vector(6.0), math.nan, 0.3)
+        rows.extend(moved(trajectory, follow, chance.randint(1, longest) * PERIOD))
+    rows.extend(moved(trajectory, Goto(Body.LOAD, (0.0, 0.0, 0.0), 0.0, 3.0), 2.0))
+    motion = np.array(rows)
+    grown = math.sqrt(3.0) * MOST_JERK * longest * PERIOD  # between one set-point and the next
+    assert np.linalg.norm(motion[:, 2], axis=1).max() < LIMITS.total + grown
+    for order in range(4):
+        step = np.abs(np.diff(motion[:, order], axis=0)).max()
+        assert step <= PERIOD * np.abs(motion[:, order + 1]).max() * 1.01 + 1e-9
+
+
+def test_it_stops_where_the_stopping_distance_says() -> None:
+    trajectory = started((3.0, 0.0, 0.0))
+    there = stopping_distance(3.0, LIMITS.acceleration)
+    motion = moved(trajectory, Goto(Body.LOAD, (there, 0.0, 0.0), 0.0, 3.0), 10.0)
+    assert motion[:, 0, 0].max() < there + 0.01
+    assert motion[:, 1, 0].min() > -0.01
+    assert motion[-1, 0, 0] == pytest.approx(there, abs=0.01)
 
 
 def test_yaw_turns_the_short_way_and_no_faster_than_it_may() -> None:

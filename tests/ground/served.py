@@ -46,7 +46,7 @@ def serve(seconds: float, local: tuple[int, int], remote: tuple[int, int], speed
                     ),
                 ):
                     for frame in split(load.pack(message)).frames:
-                        station.relay(frame, now)
+                        station.hear_plant(frame, now)
             tick += 1
             deadline = now + 0.02
             while (now := time.monotonic()) < deadline:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.trajectory import stopping_distance
 from tests.ground.kinematic import ZURICH
 from tests.ground.rig import Channel, Client, Rig
 
@@ -313,7 +314,7 @@ def test_pause_go_on_and_jump_to_an_item() -> None:
     assert rig.station.machine.mission.state == mavlink.MISSION_STATE_PAUSED
     here = rig.view.position
     rig.run(5.0)
-    assert math.dist(rig.view.position, here) < 3.0
+    assert math.dist(rig.view.position, here) < stopping_distance(3.0, 2.0) + 0.1
     client.send(mavlink.MAVLink_mission_set_current_message(1, 1, 3))
     rig.run(0.04)
     assert client.got("MISSION_CURRENT")[-1].seq == 3

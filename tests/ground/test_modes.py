@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.targets import Body, Follow, Goto, Idle, Land, Terminate
 from controller.ground.view import Profile
+from controller.trajectory import stopping_distance
 from sitl_bridge.frames import LocalOrigin, quaternion_from_euler
 from tests.ground.kinematic import PROFILE, ZURICH, grounded_view
 from tests.ground.rig import NAN, Client, Rig
@@ -227,10 +228,11 @@ def test_going_to_a_point_and_pausing() -> None:
     ack = client.command_int(192, (-1, 1, 0, 0.0), round(there[0] * 1e7), round(there[1] * 1e7), there[2])
     assert ack.result == ACCEPTED
     rig.run(1.0)
+    before = rig.view.position[1]
     assert client.command(192, -1, 1, 0, NAN, NAN, NAN, NAN).result == ACCEPTED  # QGroundControl's pause
     rig.run(3.0)
     north = rig.view.position[1]
-    assert 0.5 < north < 8.0
+    assert north == pytest.approx(before + stopping_distance(3.0, 2.0), abs=0.2)
     rig.run(3.0)
     assert rig.view.position[1] == pytest.approx(north, abs=1e-6)
     assert client.command(192, -1, 1, 0, NAN, *there).result == ACCEPTED
@@ -395,13 +397,15 @@ def test_set_points_faster_than_the_envelope_are_limited() -> None:
 
 def test_a_controller_that_starts_in_flight_holds() -> None:
     rig, _ = flying()
+    height, climb = rig.view.position[2], rig.view.velocity[2]
     again = Rig(view=rig.view)
     client = again.client()
     again.station.machine.resume(again.view, again.now)
     again.run(5.0)
     assert again.station.armed
     assert mode(again) == "HOLD"
-    assert again.view.position[2] == pytest.approx(2.5, abs=0.4)
+    expected = height + stopping_distance(climb, 2.0)
+    assert again.view.position[2] == pytest.approx(expected, abs=0.05)
     assert "Started in flight" in client.texts()[0]
     assert client.command(21).result == ACCEPTED
     again.run_until(lambda: not again.station.armed)
@@ -505,7 +509,7 @@ def test_link_to_the_plant_lost_and_back(action: int, expected: str) -> None:
     client.command(300, 0, 0)
     rig.run(0.5)
     rig.frozen = True
-    rig.view.hil_age = 1.0
+    rig.view.hil_age = rig.station.parameters["COM_HIL_LOSS_T"] + 0.1
     rig.run(1.0)
     assert any("link to the plant lost" in text for text in client.texts())
     rig.frozen = False

@@ -160,7 +160,7 @@ def test_the_load_is_passed_on_as_a_system_of_its_own_and_as_traffic() -> None:
         )
         for message in (mavlink.MAVLink_heartbeat_message(7, 8, 0, 0, 4, 3), place):
             for frame in split(load.pack(message)).frames:
-                rig.station.relay(frame, rig.now)
+                rig.station.hear_plant(frame, rig.now)
 
     rig.before_step = plant
     rig.run(5.0)

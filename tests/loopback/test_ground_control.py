@@ -174,9 +174,13 @@ def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
     [
         ("connect.py", "mavsdk"),
         ("mission.py", "mavsdk"),
+        ("parameter_sweep.py", "mavsdk"),
+        ("figure_eight.py", "mavproxy"),
     ],
 )
-def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
+def test_the_examples_fly(
+    script: str, link: str, tmp_path: Path, record_property: pytest.RecordProperty
+) -> None:
     with flying_vehicle(tmp_path) as vehicle:
         done = subprocess.run(
             [sys.executable, str(EXAMPLES / script), getattr(vehicle, link)],
@@ -187,7 +191,42 @@ def test_the_examples_fly(script: str, link: str, tmp_path: Path) -> None:
         )
         assert done.returncode == 0, done.stdout + done.stderr + vehicle.log.read_text()[-2000:]
         assert "landed" in done.stdout
-    assert_landed(vehicle)
+    flown = assert_landed(vehicle)
+    if script == "figure_eight.py":
+        assert_figure_eight(flown)
+    elif script == "mission.py":
+        report_mission(flown, record_property)
+
+
+def report_mission(flown: swing.Flown, record_property: pytest.RecordProperty) -> None:
+    """Three way-points, 5 m apart: within half a metre of each, which is their acceptance radius."""
+    corners = np.array([(0, 5), (5, 5), (5, 0)], dtype=float)
+    up = flown.time[flown.vehicle[:, 2] > 4.5]
+    flown = flown.between(float(up[0]), float(up[-1]))
+    begin = int(np.argmin(np.linalg.norm(flown.vehicle[:, :2] - corners[0], axis=1)))
+    passed = {
+        body: float(swing.overshoots(positions[begin:, :2], corners).max())
+        for body, positions in (("vehicle", flown.vehicle), ("load", flown.load))
+    }
+    largest = float(swing.swing(flown).max())
+    for body, overshoot in passed.items():
+        record_property(f"{body}_overshoot_m", overshoot)
+    record_property("largest_swing_deg", largest)
+    print(f"mission: {passed} m past a way-point at most; swing {largest:.1f} deg at most")
+    assert max(passed.values()) < 0.5
+    assert largest < 20.0
+
+
+def assert_figure_eight(flown: swing.Flown) -> None:
+    """The load was on the curve at last, all over it, though joining it took some seconds."""
+    phase = np.linspace(0.0, 2.0 * math.pi, 2000)
+    curve = np.stack([1.5 * np.sin(2.0 * phase), 3.0 * np.sin(phase), np.full_like(phase, 3.0)], axis=1)
+    up = flown.time[np.abs(flown.load[:, 2] - 3.0) < 0.05]
+    load = flown.between(float(up[0]) + 3.0, float(up[-1]) - 4.0).load[::25]
+    away = np.linalg.norm(load[:, None] - curve, axis=2).min(axis=1)
+    print(f"figure eight: the load {away.max():.3f} m from the curve at most")
+    assert away.max() < 0.1
+    assert load[:, 1].min() < -2.9
 
 
 def test_the_fixture_example_runs_as_a_plugin(tmp_path: Path) -> None:

@@ -1,0 +1,190 @@
+"""From a message that a peer has sent to the service that it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.ground import missions as mission_protocol
+from controller.ground import telemetry
+from controller.ground.command_service import CommandService
+from controller.ground.missions import Client, Missions
+from controller.ground.modes import Machine
+from controller.ground.outbox import Outbox
+from controller.ground.parameters import Parameters
+from controller.ground.peers import Peer
+from controller.ground.setpoints import setpoint_of
+from controller.ground.verdict import WARNING, Notice
+from controller.ground.view import LOAD_COMPONENT, VEHICLE_COMPONENT
+from controller.ground.wire import Packed
+from sitl_bridge.mavlink.framing import Frame
+
+_MISSION_COMPONENTS = (0, VEHICLE_COMPONENT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
+_BROADCAST = 0
+_NOT_FLOWN = {
+    mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
+    mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
+    mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
+}
+
+
+class Inbox:
+    """One method for each kind of message."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        parameters: Parameters,
+        missions: Missions,
+        commands: CommandService,
+        out: Outbox,
+    ) -> None:
+        self._profile = machine.profile
+        self._machine = machine
+        self._parameters = parameters
+        self._missions = missions
+        self._commands = commands
+        self._out = out
+
+    def take(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        """A message from a peer; what is for nobody here is left."""
+        number = frame.message_id  # not message.id: some messages have a field of that name
+        if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:
+            peer.last_station_heartbeat = now
+        handler = _HANDLERS.get(number)
+        if handler is not None:
+            handler(self, message, frame, peer, now)
+        elif number in mission_protocol.MESSAGES:
+            self._mission(message, frame, peer, now)
+        elif number in _NOT_FLOWN:
+            self._out.say_seldom(peer, _NOT_FLOWN[number], now)
+
+    def _addressed(self, message: Any, components: tuple[int, ...] = (0, VEHICLE_COMPONENT)) -> bool:
+        """Whether a message is for the vehicle."""
+        return (
+            message.target_system in (_BROADCAST, self._profile.system)
+            and message.target_component in components
+        )
+
+    def _to_load(self, message: Any) -> bool:
+        return message.target_system == self._profile.load_system and message.target_component in (
+            0,
+            LOAD_COMPONENT,
+        )
+
+    def _command(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        to_load = self._to_load(message)
+        if to_load or self._addressed(message):
+            self._commands.receive(message, frame, peer, to_load, now)
+
+    def _set_mode(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if message.target_system == self._profile.system:
+            self._commands.set_mode(message, peer, now)
+
+    def _parameter_list(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if self._addressed(message):
+            self._parameters.request_list(peer.address, now)
+
+    def _parameter_read(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if self._addressed(message):
+            reply, say = self._talk(frame, peer, now)
+            self._parameters.request_read(message.param_id, message.param_index, reply, say)
+
+    def _parameter_set(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if not self._addressed(message):
+            return
+        reply, say = self._talk(frame, peer, now)
+        raw = frame.payload[:4].ljust(4, b"\0")
+        if self._parameters.request_set(message.param_id, message.param_type, raw, reply, say):
+            self._out.broadcast(self._parameters.value_message(message.param_id), now)
+        elif peer.speaks_v1:
+            # PARAM_ERROR does not exist in MAVLink 1: the value as it stays says the same.
+            self._parameters.request_read(message.param_id, -1, reply, say)
+
+    def _talk(
+        self, frame: Frame, peer: Peer, now: float
+    ) -> tuple[Callable[[Any], None], Callable[[str], None]]:
+        """How to reply to a frame's sender, and how to tell its user something."""
+
+        def reply(message: Any) -> None:
+            if not isinstance(message, Packed) and hasattr(message, "target_system"):
+                message.target_system, message.target_component = frame.system, frame.component
+            self._out.send(peer, message, now)
+
+        return reply, lambda text: self._out.say(peer, Notice(WARNING, text), now)
+
+    def _mission(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if self._addressed(message, _MISSION_COMPONENTS):
+            client = Client(peer.address, frame.system, frame.component)
+            reply, say = self._talk(frame, peer, now)
+            self._missions.receive(message, client, now, reply, say)
+
+    def _set_current_item(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if not self._addressed(message, _MISSION_COMPONENTS):
+            return
+        verdict = self._machine.set_current_item(message.seq)
+        if verdict.ok:
+            current = telemetry.build(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, self._machine)
+            self._out.broadcast(current, now)
+        else:
+            self._out.say(peer, Notice(WARNING, verdict.text), now)
+
+    def _setpoint(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        to_load = self._to_load(message)
+        if not (to_load or self._addressed(message)):
+            return
+        view = self._machine.view
+        if view is None:
+            self._out.say_seldom(peer, "Set-point refused: no position yet; start the plant", now)
+            return
+        home = self._machine.home or (0.0, 0.0, 0.0)
+        found = setpoint_of(message, to_load, self._profile, home, view)
+        sender = (peer.address, frame.system, frame.component)
+        fault = found if isinstance(found, str) else self._machine.offer(found, sender, now)
+        if fault:
+            self._out.say_seldom(peer, fault, now)
+
+    def _data_stream(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if self._addressed(message):
+            on = message.start_stop == 1
+            peer.streams.set_group(message.req_stream_id, message.req_message_rate, on, now)
+
+    def _ping(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if message.target_system == 0 and message.target_component == 0:
+            ping = mavlink.MAVLink_ping_message
+            self._out.send(peer, ping(message.time_usec, message.seq, frame.system, frame.component), now)
+
+    def _time_sync(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if message.tc1 == 0:
+            self._out.send(peer, mavlink.MAVLink_timesync_message(int(now * 1e9), message.ts1), now)
+
+    def _refuse_ftp(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        """FTP's negative acknowledgement, at once: clients then use the other protocols."""
+        if message.target_system != self._profile.system:
+            return
+        request = bytes(message.payload)
+        sequence = int.from_bytes(request[:2], "little") + 1 & 0xFFFF
+        # Sequence, session, NAK, size 1, requested opcode, burst, padding, offset; UnknownCommand.
+        answer = sequence.to_bytes(2, "little") + bytes((request[2], 129, 1, request[3], 0, 0, 0, 0, 0, 0, 7))
+        ftp = mavlink.MAVLink_file_transfer_protocol_message
+        self._out.send(peer, ftp(0, frame.system, frame.component, answer.ljust(251, b"\0")), now)
+
+
+_Handler = Callable[[Inbox, Any, Frame, Peer, float], None]
+_HANDLERS: dict[int, _Handler] = {
+    mavlink.MAVLINK_MSG_ID_COMMAND_LONG: Inbox._command,
+    mavlink.MAVLINK_MSG_ID_COMMAND_INT: Inbox._command,
+    mavlink.MAVLINK_MSG_ID_SET_MODE: Inbox._set_mode,
+    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: Inbox._parameter_list,
+    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: Inbox._parameter_read,
+    mavlink.MAVLINK_MSG_ID_PARAM_SET: Inbox._parameter_set,
+    mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: Inbox._set_current_item,
+    mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: Inbox._setpoint,
+    mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: Inbox._setpoint,
+    mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
+    mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
+    mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,
+    mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: Inbox._refuse_ftp,
+}

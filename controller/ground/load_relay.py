@@ -1,0 +1,83 @@
+"""The load's own messages, passed on from the plant's link, and the load as traffic for QGroundControl."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.ground.outbox import Outbox
+from controller.ground.peers import Address, Peer
+from controller.ground.view import Profile
+from controller.ground.wire import Packed, decoded, packed
+from sitl_bridge.mavlink.framing import Frame
+
+LOAD_SILENCE = 2.0
+"""s after which the load's last message is too old to be passed on"""
+_RATES = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0}
+"""Hz, at most, at which the load's own messages are passed on"""
+_ADSB_FLAGS = (
+    mavlink.ADSB_FLAGS_VALID_COORDS
+    | mavlink.ADSB_FLAGS_VALID_ALTITUDE
+    | mavlink.ADSB_FLAGS_VALID_HEADING
+    | mavlink.ADSB_FLAGS_VALID_VELOCITY
+    | mavlink.ADSB_FLAGS_VALID_CALLSIGN
+    | mavlink.ADSB_FLAGS_SIMULATED
+)
+
+
+class LoadRelay:
+    """The latest that the load has said, and to whom it was passed on when."""
+
+    def __init__(self, profile: Profile) -> None:
+        self._profile = profile
+        self._latest: dict[int, tuple[Packed, float]] = {}
+        self._sent: dict[tuple[Address, int], float] = {}
+
+    def take(self, frame: Frame, now: float) -> bool:
+        """A frame from the plant; whether it was the load's and is to be passed on."""
+        if frame.system != self._profile.load_system or frame.message_id not in _RATES:
+            return False
+        message = decoded(frame)
+        as_packed = None if message is None else packed(message)
+        if as_packed is not None:
+            self._latest[frame.message_id] = (as_packed, now)
+        return as_packed is not None
+
+    def forget(self, address: Address) -> None:
+        """A peer is gone."""
+        for key in [key for key in self._sent if key[0] == address]:
+            del self._sent[key]
+
+    def pass_on(self, peer: Peer, out: Outbox, now: float) -> None:
+        """Send a peer what is new and due."""
+        for message_id, (message, time) in self._latest.items():
+            last = self._sent.get((peer.address, message_id), -math.inf)
+            if time > last and now - last >= 0.999 / _RATES[message_id]:
+                self._sent[peer.address, message_id] = now
+                out.send(peer, message, now, of_load=True)
+
+    def as_traffic(self, now: float) -> Any:
+        """ADSB_VEHICLE for the load, which QGroundControl draws no other way; None while it is silent."""
+        found = self._latest.get(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
+        if found is None or now - found[1] > LOAD_SILENCE:
+            return None
+        place = mavlink.MAVLink_global_position_int_message
+        _, lat, lon, alt, _, vx, vy, vz, _ = place.unpacker.unpack(found[0].payload)
+        course = math.degrees(math.atan2(vy, vx)) % 360
+        return mavlink.MAVLink_adsb_vehicle_message(
+            self._profile.load_system,
+            lat,
+            lon,
+            mavlink.ADSB_ALTITUDE_TYPE_GEOMETRIC,
+            alt,
+            int(course * 100) % 36000,
+            min(int(math.hypot(vx, vy)), 0xFFFF),
+            -vz if vz > -0x8000 else 0x7FFF,
+            f"LOAD{self._profile.instance}".encode(),
+            mavlink.ADSB_EMITTER_TYPE_LIGHTER_AIR,
+            1,
+            _ADSB_FLAGS,
+            0,
+        )
