@@ -268,8 +268,8 @@ def _control(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--feedback",
         choices=("truth", "estimate"),
-        default="truth",
-        help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth)",
+        help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth for "
+        "vehicle paper in the paper's scenarios, else estimate)",
     )
 
 
@@ -418,7 +418,7 @@ def _plant(arguments: argparse.Namespace) -> int:
 def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
-    from sitl.scenario import GroundControl, Hover
+    from sitl.scenario import GroundControl, Hover, usual_feedback
 
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
@@ -435,7 +435,7 @@ def _controller(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         seed=arguments.seed,
         ground=_ground_options(arguments),
-        feedback=arguments.feedback,
+        feedback=arguments.feedback or usual_feedback(scenario, vehicle),
         out=arguments.out,
     )
     outcome = run(options, speaker, stop)

@@ -1,4 +1,7 @@
-"""Changes of model: slack and taut, load on the ground, load gone. A surprise is not divergence."""
+"""Changes of model: vehicle on the ground or not, cable slack or taut, load on the ground or gone.
+
+A surprise is not divergence.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,18 @@ from typing import Any
 
 from controller.estimator.layout import (
     ACCELEROMETER,
+    ATTITUDE,
     FLYING,
+    FORCE,
     LOAD,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_RELEASED,
     LOAD_VELOCITY,
+    POSITION,
+    STANDING,
+    VELOCITY,
+    X_FORCE,
     X_LOAD,
     X_LOAD_VELOCITY,
     X_POSITION,
@@ -32,13 +41,21 @@ RELEASE_TIME = 1.5
 IMPOSSIBLE_PULL = 1e3
 """Of the load's weight; a sensor that shows that, or no number, shows nothing."""
 GROUND_MARGIN = 0.5
-"""m: a slack cable with the load this low means that the load lies on the ground."""
+"""m, and three standard deviations: what is this low may be on the ground."""
+CONTACT_TIME = 0.12
+"""s: so long something below has to carry vehicle or load, until they stand or lie on it."""
+CARRIED = 0.2
+"""Share of the vehicle's weight that has to be carried from below."""
+LIGHT = 0.4
+"""Share of its weight with which a load that is set down still hangs on the cable, at most."""
 
 
 @kernel
 def watch(f: Filter, measured: Any) -> None:
     """Compare the pull that the accelerometer shows with what the model says, and change the model."""
     p, m, x = f.p, f.m, f.x
+    if m.vehicle_mode == STANDING and m.grounded and m.thrust > p.vehicle_mass * p.gravity:
+        leave_ground(f)
     if m.vehicle_mode != FLYING:
         return
     out = f.vectors[0]
@@ -49,11 +66,24 @@ def watch(f: Filter, measured: Any) -> None:
         m.pull[axis] += blend * (out[axis] - m.pull[axis])
     pull = math.sqrt(m.pull[0] ** 2 + m.pull[1] ** 2 + m.pull[2] ** 2)
     weight = p.load_mass * p.gravity
+    if p.has_ground:
+        low = x[X_POSITION + 2] - 3.0 * math.sqrt(f.P[POSITION + 2, POSITION + 2]) - GROUND_MARGIN
+        carried = m.pull[2] > CARRIED * p.vehicle_mass * p.gravity and low < p.standing_height
+        m.contact_time = m.contact_time + p.period if carried else 0.0
+        if m.contact_time > CONTACT_TIME:
+            stand(f)
+            return
     if m.rejected_in_row[ACCELEROMETER] * p.period > CONFIRM_TIME:
         # The accelerometer and the model have parted: where the load is has to be found again.
         m.rejected_in_row[ACCELEROMETER] = 0
         if m.load_mode == LOAD_ON_CABLE:
             place_load(f, pull)
+    if m.load_mode == LOAD_ON_GROUND:
+        if -m.pull[2] > 0.95 * weight:
+            m.load_mode = LOAD_ON_CABLE
+            if m.tension < 0.5 * weight:
+                place_load(f, pull)
+        return
     if p.two_way:
         return
     # What smoothing leaves of noise and unmodelled force, three standard deviations.
@@ -64,22 +94,61 @@ def watch(f: Filter, measured: Any) -> None:
     m.slack_time = m.slack_time + p.period if slack else 0.0
     surprising = not slack and (m.load_mode == LOAD_RELEASED or m.tension <= 0.0)
     m.pull_time = m.pull_time + p.period if surprising else 0.0
-    if m.load_mode == LOAD_ON_GROUND:
-        if -m.pull[2] > 0.95 * weight:
-            m.load_mode = LOAD_ON_CABLE
-            place_load(f, pull)
-    elif m.pull_time > CONFIRM_TIME:
+    set_down = p.has_ground and -m.pull[2] < LIGHT * weight and _load_is_low(f)
+    m.lying_time = m.lying_time + p.period if set_down else 0.0
+    if m.pull_time > CONFIRM_TIME:
         m.load_mode = LOAD_ON_CABLE
         m.pull_time = 0.0
         place_load(f, pull)
-    elif m.load_mode == LOAD_ON_CABLE and slack and m.tension <= 0.0:
-        low = x[X_POSITION + 2] + x[X_LOAD + 2] < GROUND_MARGIN
-        if p.has_ground and low and m.slack_time > 0.2:
-            m.load_mode = LOAD_ON_GROUND
-            for axis in range(3):
-                x[X_LOAD_VELOCITY + axis] = -x[X_VELOCITY + axis]
-        elif m.slack_time > RELEASE_TIME:
-            release(f)
+    elif m.load_mode == LOAD_ON_CABLE and m.lying_time > CONTACT_TIME:
+        lay_load(f)
+    elif m.load_mode == LOAD_ON_CABLE and m.slack_time > RELEASE_TIME and m.tension <= 0.0:
+        release(f)
+
+
+@kernel
+def _load_is_low(f: Filter) -> bool:
+    cov, x = f.P, f.x
+    above = POSITION + 2
+    hanging = LOAD + 2
+    variance = cov[above, above] + 2.0 * cov[above, hanging] + cov[hanging, hanging]
+    height = x[X_POSITION + 2] + x[X_LOAD + 2] - 3.0 * math.sqrt(max(0.0, variance))
+    return bool(height < f.p.lying_height + GROUND_MARGIN)
+
+
+@kernel
+def lay_load(f: Filter) -> None:
+    """The load lies on the ground: it moves no more, and is about where it was."""
+    f.m.load_mode = LOAD_ON_GROUND
+    for axis in range(3):
+        f.x[X_LOAD_VELOCITY + axis] = -f.x[X_VELOCITY + axis]
+    set_part(f, LOAD_VELOCITY, 3, 0.5)
+    for i in range(LOAD, LOAD + 3):
+        f.P[i, i] += 0.1**2
+
+
+@kernel
+def leave_ground(f: Filter) -> None:
+    """What held or carried the vehicle is gone: forces, rates and load start anew."""
+    f.m.vehicle_mode = FLYING
+    f.m.grounded = False
+    f.m.contact_time = 0.0
+    set_part(f, FORCE, 3, f.p.force_std)
+    for part in (LOAD, LOAD_VELOCITY):
+        for i in range(part, part + 3):
+            f.P[i, i] += f.p.initial_std[i] ** 2
+
+
+@kernel
+def stand(f: Filter) -> None:
+    """The vehicle stands on the ground: whatever it did before, it is at rest now."""
+    f.m.vehicle_mode = STANDING
+    f.m.grounded = True
+    f.m.contact_time = 0.0
+    for axis in range(3):
+        f.x[X_FORCE + axis] = 0.0
+        f.P[VELOCITY + axis, VELOCITY + axis] += 0.3**2
+        f.P[ATTITUDE + axis, ATTITUDE + axis] += 0.01**2
 
 
 @kernel
@@ -98,6 +167,9 @@ def place_load(f: Filter, pull: float) -> None:
             x[X_LOAD + axis] *= 0.98 * p.rest_length / length
     set_part(f, LOAD, 3, 0.15 * length)
     set_part(f, LOAD_VELOCITY, 3, 1.5)
+    for axis in range(3):
+        x[X_FORCE + axis] = 0.0  # all that pulls has been taken for the cable
+    set_part(f, FORCE, 3, p.force_std)
 
 
 @kernel
