@@ -158,6 +158,7 @@ MEMORY = np.dtype(
         ("slack_time", "f8"),
         ("pull", "f8", 3),
         ("pull_time", "f8"),
+        ("hung", "f8", 2),
         ("load_resets", "i8"),
         ("stale_count", "i8"),
         ("last_magnetometer", "f8", 3),
@@ -184,7 +185,8 @@ MEMORY = np.dtype(
 """What the filter remembers besides state and covariance.
 
 grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
-something below has carried the vehicle or the load.
+something below has carried the vehicle or the load; hung: m, world, where the load hung last with all its
+weight.
 innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
 within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """

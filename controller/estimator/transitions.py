@@ -29,7 +29,7 @@ from controller.estimator.layout import (
     Filter,
 )
 from controller.estimator.sensors import measured_pull
-from controller.estimator.update import set_part
+from controller.estimator.update import ROW, begin, fuse, inject, set_part
 from sitl_bridge.compiled import kernel
 
 PULL_TIME = 0.04
@@ -46,8 +46,13 @@ CONTACT_TIME = 0.12
 """s: so long something below has to carry vehicle or load, until they stand or lie on it."""
 CARRIED = 0.2
 """Share of the vehicle's weight that has to be carried from below."""
-LIGHT = 0.4
-"""Share of its weight with which a load that is set down still hangs on the cable, at most."""
+LIGHT, HANGING, LIFTING = 0.4, 0.8, 0.95
+"""Shares of its weight: less than LIGHT on the cable, and a load has been set down; with more than HANGING it
+hangs where it is; with LIFTING one that lay leaves the ground."""
+KNOWN = 0.2
+"""Of the cable's length: a load whose place is known better is not looked for anew."""
+STRETCH_STD = 0.02
+"""Of the cable's length: how well a pull shows how long the cable is."""
 
 
 @kernel
@@ -78,14 +83,6 @@ def watch(f: Filter, measured: Any) -> None:
         m.rejected_in_row[ACCELEROMETER] = 0
         if m.load_mode == LOAD_ON_CABLE:
             place_load(f, pull)
-    if m.load_mode == LOAD_ON_GROUND:
-        if -m.pull[2] > 0.95 * weight:
-            m.load_mode = LOAD_ON_CABLE
-            if m.tension < 0.5 * weight:
-                place_load(f, pull)
-        return
-    if p.two_way:
-        return
     # What smoothing leaves of noise and unmodelled force, three standard deviations.
     noise = math.sqrt(p.sensor_std[ACCELEROMETER] ** 2 + p.force_std**2)
     floor = 3.0 * p.vehicle_mass * noise * math.sqrt(blend)
@@ -94,7 +91,19 @@ def watch(f: Filter, measured: Any) -> None:
     m.slack_time = m.slack_time + p.period if slack else 0.0
     surprising = not slack and (m.load_mode == LOAD_RELEASED or m.tension <= 0.0)
     m.pull_time = m.pull_time + p.period if surprising else 0.0
-    set_down = p.has_ground and -m.pull[2] < LIGHT * weight and _load_is_low(f)
+    down = -m.pull[2]
+    if m.load_mode == LOAD_ON_GROUND:
+        if m.pull_time > CONFIRM_TIME and down > floor:
+            take_up(f, pull)
+        if down > LIFTING * weight:
+            lift_load(f, pull)
+        return
+    if p.two_way:
+        return
+    if down > HANGING * weight:
+        for axis in range(2):
+            m.hung[axis] = x[X_POSITION + axis] + x[X_LOAD + axis]
+    set_down = p.has_ground and down < LIGHT * weight and _load_is_low(f)
     m.lying_time = m.lying_time + p.period if set_down else 0.0
     if m.pull_time > CONFIRM_TIME:
         m.load_mode = LOAD_ON_CABLE
@@ -118,13 +127,44 @@ def _load_is_low(f: Filter) -> bool:
 
 @kernel
 def lay_load(f: Filter) -> None:
-    """The load lies on the ground: it moves no more, and is about where it was."""
-    f.m.load_mode = LOAD_ON_GROUND
+    """The load lies on the ground: it moves no more, and is where it hung last.
+
+    Since then the ground's force on it has been taken for something else, and misplaced it.
+    """
+    p, m, x = f.p, f.m, f.x
+    m.load_mode = LOAD_ON_GROUND
+    x[X_LOAD] = m.hung[0] - x[X_POSITION]
+    x[X_LOAD + 1] = m.hung[1] - x[X_POSITION + 1]
+    x[X_LOAD + 2] = p.lying_height - x[X_POSITION + 2]
     for axis in range(3):
-        f.x[X_LOAD_VELOCITY + axis] = -f.x[X_VELOCITY + axis]
+        x[X_LOAD_VELOCITY + axis] = -x[X_VELOCITY + axis]
+    set_part(f, LOAD, 3, 0.1 * p.rest_length)
     set_part(f, LOAD_VELOCITY, 3, 0.5)
-    for i in range(LOAD, LOAD + 3):
-        f.P[i, i] += 0.1**2
+
+
+@kernel
+def take_up(f: Filter, pull: float) -> None:
+    """The cable is taut although the model says slack: it is as long as the pull shows, `pull` in N."""
+    p, x = f.p, f.x
+    length = math.sqrt(x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2) + 1e-9
+    begin(f)
+    for axis in range(3):
+        f.vectors[ROW, LOAD + axis] = x[X_LOAD + axis] / length
+    fuse(f, p.rest_length + pull / p.stiffness - length, (STRETCH_STD * p.rest_length) ** 2)
+    inject(f)
+
+
+@kernel
+def lift_load(f: Filter, pull: float) -> None:
+    """The load leaves the ground."""
+    p, m = f.p, f.m
+    m.load_mode = LOAD_ON_CABLE
+    known = (KNOWN * p.rest_length) ** 2
+    if f.P[LOAD, LOAD] > known or f.P[LOAD + 1, LOAD + 1] > known:
+        place_load(f, pull)
+        return
+    for i in range(LOAD_VELOCITY, LOAD_VELOCITY + 3):
+        f.P[i, i] += 0.2**2
 
 
 @kernel
