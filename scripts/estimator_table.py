@@ -2,7 +2,7 @@
 
     python scripts/estimator_table.py --seeds 20 --duration 120 --out runs/estimator
 
-Vehicle `paper` in hover under 5 N of white force. A flight whose summary lies in --out already is not flown again.
+Vehicle `paper` in hover under 5 N of white force. What lies in --out already is not flown again.
 """
 
 from __future__ import annotations
