@@ -25,6 +25,9 @@ from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
 ALIGNMENT_TIME = 1.0
 """From the first tick, or from the one with which the plant's sensors began, to arming, s."""
+LONGEST_BACKLOG = 10.0
+"""s of ticks that may lie in a socket before the one with which the plant's sensors begin. Without that one,
+arming waits so long: it may be yet to come."""
 LONGEST_WAIT = 3.0
 """s for which the law on truth waits for an estimator that runs beside it."""
 FALLING = 0.5
@@ -83,6 +86,8 @@ class EstimateFeedback:
         self.estimator = Estimator(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
         self.guessing = False
         """Whether it is still open if the vehicle stands or flies."""
+        self.fresh = False
+        """Whether the plant's sensors have begun with us."""
         self._rate_hz = rate_hz
         self._say = say
         self._only_good = only_good
@@ -92,6 +97,7 @@ class EstimateFeedback:
         self._origin = LocalOrigin(vehicle.home.latitude, vehicle.home.longitude, vehicle.home.altitude)
         self._largest_speeds = np.array([rotor.max_speed for rotor in vehicle.rotors])
         self._standing = np.zeros(len(vehicle.rotors))
+        self._hover_speeds = np.array(hover_rotor_speeds(vehicle))
         self._watch = HealthWatch(vehicle.sensors.tracker is not None)
         self.restart()
 
@@ -106,11 +112,13 @@ class EstimateFeedback:
         self._tick = self._first_flown = self._falling = 0
         self._last_gps_usec = 0
         self.guessing = in_flight
+        self.fresh = False
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick, once it is aligned and good enough to fly on."""
         if reader.begun:
             self._align(in_flight=False)
+            self.fresh = True
         elif self._first_usec is None:
             self._align(in_flight=True)
         if self._first_usec is None:
@@ -132,7 +140,7 @@ class EstimateFeedback:
             if frame.message_id == MAVLINK_MSG_ID_LANDING_TARGET:
                 self._see_load(decode(frame))
         estimate = estimator.tick(self._tick / self._rate_hz)
-        if self.guessing:
+        if self.guessing or (estimator.in_flight and not self._flown and not self.ready()):
             return None
         if not self._only_good:
             return estimate
@@ -150,8 +158,8 @@ class EstimateFeedback:
         if not self._flown:
             self._flown = True
             self._first_flown = self._tick
-            if self._vehicle.initial.start == "hover" and not self.estimator.flying:
-                self.estimator.take_off(np.array(hover_rotor_speeds(self._vehicle)))
+        if self.estimator.held and self._vehicle.initial.start == "hover":
+            self.estimator.take_off(self._hover_speeds)
         if self._log is not None:
             self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
         self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
@@ -170,7 +178,8 @@ class EstimateFeedback:
 
     def ready(self) -> bool:
         """Whether it is aligned, and good enough to begin a flight on."""
-        if not self.estimator.in_flight and self._tick < round(ALIGNMENT_TIME * self._rate_hz):
+        wait = LONGEST_BACKLOG if self._only_good and not self.fresh else ALIGNMENT_TIME
+        if not self.estimator.in_flight and self._tick < round(wait * self._rate_hz):
             return False
         health = self.estimator.health()
         return health.attitude and health.velocity and health.position
@@ -226,9 +235,10 @@ class TruthBesideEstimate(TruthFeedback):
         """The truth, from when the estimator has aligned; it is not waited for longer than LONGEST_WAIT."""
         estimate = self._beside.take(time_usec, tick, reader)
         truth = super().take(time_usec, tick, reader)
-        if not self._begun:
+        if not self._begun and truth is not None:
             self._patience -= 1
-            self._begun = truth is not None and (estimate is not None or self._patience <= 0)
+            waits = self._beside.fresh and self._patience > 0  # not where it may be in flight
+            self._begun = estimate is not None or not waits
         return truth if self._begun else None
 
     def flown(self, controls: Array, armed: bool) -> None:

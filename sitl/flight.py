@@ -10,7 +10,7 @@ from typing import Any
 
 from controller.feedback import estimates
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.scenario import GroundControl, Scenario, scenario_vehicle, usual_feedback
+from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
@@ -76,7 +76,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
     """Fly; returns the summary, which is also in the output folder. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    flown = scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    flown = plant_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
     checked(scenario.faults, flown)
     assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)

@@ -71,6 +71,7 @@ class Scenario(Section):
     description: str = quantity("-", "one line", "")
     vehicle: str = quantity("-", "name or file of the vehicle")
     set: tuple[str, ...] = quantity("-", "overrides of the vehicle, KEY=VALUE", ())
+    plant_set: tuple[str, ...] = quantity("-", "overrides that only the plant has, KEY=VALUE", ())
     duration: float | None = quantity("s", "how long it flies; without it, until it is stopped", None, gt=0)
     feedback: Literal["truth", "estimate"] | None = quantity(
         "-", "what the law flies on, if not as usual", None
@@ -93,6 +94,11 @@ def load_scenario(name_or_file: str) -> Scenario:
 def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
     """The scenario's vehicle, with what the command line says on top."""
     return load_vehicle(vehicle or scenario.vehicle, [*scenario.set, *overrides])
+
+
+def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
+    """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
+    return scenario_vehicle(scenario, vehicle, [*scenario.plant_set, *overrides])
 
 
 def usual_feedback(scenario: Scenario | None, vehicle: Vehicle) -> str:

@@ -216,6 +216,11 @@ class Estimator:
         return int(self.memory["vehicle_mode"]) == FLYING
 
     @property
+    def held(self) -> bool:
+        """Whether it takes the vehicle to be held in the air, at its start."""
+        return self.aligned and not self.flying and not self.memory["grounded"]
+
+    @property
     def grounded(self) -> bool:
         """Whether it takes the vehicle to stand on the ground."""
         return bool(self.memory["grounded"]) and not self.flying

@@ -42,6 +42,8 @@ IMPOSSIBLE_PULL = 1e3
 """Of the load's weight; a sensor that shows that, or no number, shows nothing."""
 GROUND_MARGIN = 0.5
 """m, and three standard deviations: what is this low may be on the ground."""
+UNKNOWN_HEIGHT = 5.0
+"""m, standard deviation: whoever knows his height no better knows nothing of the ground."""
 CONTACT_TIME = 0.12
 """s: so long something below has to carry vehicle or load, until they stand or lie on it."""
 CARRIED = 0.2
@@ -72,8 +74,8 @@ def watch(f: Filter, measured: Any) -> None:
     pull = math.sqrt(m.pull[0] ** 2 + m.pull[1] ** 2 + m.pull[2] ** 2)
     weight = p.load_mass * p.gravity
     if p.has_ground:
-        low = x[X_POSITION + 2] - 3.0 * math.sqrt(f.P[POSITION + 2, POSITION + 2]) - GROUND_MARGIN
-        carried = m.pull[2] > CARRIED * p.vehicle_mass * p.gravity and low < p.standing_height
+        low = is_low(x[X_POSITION + 2], f.P[POSITION + 2, POSITION + 2], p.standing_height)
+        carried = low and m.pull[2] > CARRIED * p.vehicle_mass * p.gravity
         m.contact_time = m.contact_time + p.period if carried else 0.0
         if m.contact_time > CONTACT_TIME:
             stand(f)
@@ -116,13 +118,20 @@ def watch(f: Filter, measured: Any) -> None:
 
 
 @kernel
+def is_low(height: float, variance: float, rest: float) -> bool:
+    """Whether something may be on the ground, where it would have the height `rest`, m."""
+    if variance > UNKNOWN_HEIGHT**2:
+        return False
+    return bool(height - 3.0 * math.sqrt(max(0.0, variance)) < rest + GROUND_MARGIN)
+
+
+@kernel
 def _load_is_low(f: Filter) -> bool:
     cov, x = f.P, f.x
     above = POSITION + 2
     hanging = LOAD + 2
     variance = cov[above, above] + 2.0 * cov[above, hanging] + cov[hanging, hanging]
-    height = x[X_POSITION + 2] + x[X_LOAD + 2] - 3.0 * math.sqrt(max(0.0, variance))
-    return bool(height < f.p.lying_height + GROUND_MARGIN)
+    return is_low(x[X_POSITION + 2] + x[X_LOAD + 2], variance, f.p.lying_height)
 
 
 @kernel
@@ -181,13 +190,18 @@ def leave_ground(f: Filter) -> None:
 
 @kernel
 def stand(f: Filter) -> None:
-    """The vehicle stands on the ground: whatever it did before, it is at rest now."""
+    """The vehicle stands on the ground: whatever it did before, it is at rest now.
+
+    What was believed of its velocity is forgotten and not found wrong: that would move its place by metres,
+    under a law that is still at work.
+    """
     f.m.vehicle_mode = STANDING
     f.m.grounded = True
     f.m.contact_time = 0.0
+    set_part(f, VELOCITY, 3, 0.1)
     for axis in range(3):
         f.x[X_FORCE + axis] = 0.0
-        f.P[VELOCITY + axis, VELOCITY + axis] += 0.3**2
+        f.x[X_VELOCITY + axis] = 0.0
         f.P[ATTITUDE + axis, ATTITUDE + axis] += 0.01**2
 
 
