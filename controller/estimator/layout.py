@@ -169,7 +169,8 @@ MEMORY = np.dtype(
         ("next_load_clone", "f8"),
         ("slip", "f8", 6),
         ("slip_until", "f8"),
-        ("height_suspicion", "f8"),
+        ("adrift", "b1"),
+        ("height_suspicion", "f8"),  # running mean of normalised GPS height innovations
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
         ("normalised", "f8", (SENSOR_COUNT, 3)),

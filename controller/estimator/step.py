@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from controller.estimator.alignment import align, start_hanging
-from controller.estimator.delayed import gps, remember, tracker
+from controller.estimator.delayed import OUTAGE, gps, remember, tracker
 from controller.estimator.layout import (
     ALIGNING,
     BODY_RATES_OUT,
@@ -17,6 +17,8 @@ from controller.estimator.layout import (
     EULER_OUT,
     FILTER,
     FLYING,
+    GPS_POSITION,
+    GPS_VELOCITY,
     INPUT,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
@@ -107,6 +109,8 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
             remember(f, CLONE_LOAD)
             m.next_load_clone += p.tracker_interval
     m.time = given.time
+    silence = m.time - max(m.last_used[GPS_POSITION], m.last_used[GPS_VELOCITY])
+    m.adrift = m.vehicle_mode == FLYING and silence > OUTAGE
     if given.has_imu:
         gyroscope(f, given.gyroscope)
         accelerometer(f, given.accelerometer)

@@ -56,9 +56,7 @@ class GuidedFlight:
 
     def start_controller(self, **parameters: float) -> None:
         """A controller that knows nothing of what was before."""
-        self.feedback = EstimateFeedback(
-            self.vehicle, RATE_HZ, say=self.said.append, only_good=False
-        )
+        self.feedback = EstimateFeedback(self.vehicle, RATE_HZ, say=self.said.append, only_good=False)
         self.station = Station(profile_of(self.vehicle, 0, self.vehicle.ground is not None), 0.0)
         for name, value in parameters.items():
             self.station.parameters.set(name, value)
