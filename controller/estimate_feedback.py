@@ -226,6 +226,8 @@ class EstimateFeedback:
 class TruthBesideEstimate(TruthFeedback):
     """The law flies on truth; the estimator runs beside it, for its log."""
 
+    plain = False
+
     def __init__(self, beside: EstimateFeedback, rate_hz: float) -> None:
         self._beside = beside
         self._patience = round(LONGEST_WAIT * rate_hz)
