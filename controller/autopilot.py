@@ -8,15 +8,12 @@ import numpy as np
 
 from controller.allocation import allocation
 from controller.designs import design
+from controller.feedback import PathFrom
 from controller.law import WORK, Law, engaged_memory
-from controller.reference import Path
 from controller.state import LOAD_POSITION, Array
 from controller.step import control_step
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle import Vehicle
-
-PathFrom = Callable[[tuple[float, float, float]], Path]
-"""Makes the reference path, given where the load is (m, world) when the law takes over."""
 
 
 class Autopilot:

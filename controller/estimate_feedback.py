@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,17 +11,34 @@ from pymavlink.dialects.v20.common import MAVLINK_MSG_ID_LANDING_TARGET
 from controller.estimate_log import EstimateLog
 from controller.estimator.filter import Estimator
 from controller.estimator.tuning import Tuning, from_sensors
+from controller.feedback import PathFrom, TruthFeedback
+from controller.health_watch import HealthWatch
 from controller.hil.ticks import Tick, TickReader
 from controller.model import rotor_time_constant
+from controller.reference import Path
 from controller.state import Array
-from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin, fix_from_wire, flu_to_frd
+from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin, Triple, fix_from_wire, flu_to_frd
 from sitl_bridge.magnetic import field_at
 from sitl_bridge.mavlink.framing import decode
 from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
 ALIGNMENT_TIME = 1.0
 """From the first tick, or from the one with which the plant's sensors began, to arming, s."""
+LONGEST_BACKLOG = 10.0
+"""s of ticks that may lie in a socket before the one with which the plant's sensors begin. Without that one,
+arming waits so long: it may be yet to come."""
+LONGEST_WAIT = 3.0
+"""s for which the law on truth waits for an estimator that runs beside it."""
+FALLING = 0.5
+"""Of gravity: less than this along body z, with the rotors stopped, and the vehicle falls."""
+FALLING_SAMPLES = 3
+GUESSING_TIME = 0.1
+"""s in which a vehicle that was flying when the controller came has begun to fall."""
+CHECK_EVERY = 25
+"""Ticks between two looks at whether the estimate can still be flown on."""
+LOST_TILT, LOST_POSITION = 0.35, 30.0
+"""rad and m, standard deviations: who knows no more than this cannot go on."""
 _PARTS = 16
 """Late measurements belong to the nearest sixteenth of a tick: the wire's microseconds are rounded, and how
 depends on when the plant was started."""
@@ -45,37 +63,70 @@ class EstimateFeedback:
 
     It aligns at rest from the tick on with which the plant's sensors begin (HIL_SENSOR_UPDATED_RESET), and
     counts time in ticks from there, so that in lockstep the flight does not depend on who was started when.
+    A plant whose sensors do not begin with us has flown before. If it then falls while the rotors stand, it
+    was in the air, and the alignment is that in flight.
     """
 
     name = "estimate"
     needs_truth = False
     plain = False
 
-    def __init__(self, vehicle: Vehicle, rate_hz: float, log: EstimateLog | None = None) -> None:
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        log: EstimateLog | None = None,
+        say: Callable[[str], None] = lambda text: None,
+        only_good: bool = True,
+    ) -> None:
+        """only_good: give no estimate before it is good enough to fly on, nor when it is so no more.
+
+        Otherwise whoever takes it has to look at its health.
+        """
         self.estimator = Estimator(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
+        self.guessing = False
+        """Whether it is still open if the vehicle stands or flies."""
+        self.fresh = False
+        """Whether the plant's sensors have begun with us."""
         self._rate_hz = rate_hz
+        self._say = say
+        self._only_good = only_good
+        self._vehicle = vehicle
         self._tracker = vehicle.sensors.tracker
         self._log = log
         self._origin = LocalOrigin(vehicle.home.latitude, vehicle.home.longitude, vehicle.home.altitude)
         self._largest_speeds = np.array([rotor.max_speed for rotor in vehicle.rotors])
+        self._standing = np.zeros(len(vehicle.rotors))
+        self._hover_speeds = np.array(hover_rotor_speeds(vehicle))
+        self._watch = HealthWatch(vehicle.sensors.tracker is not None)
         self.restart()
 
     def restart(self) -> None:
         """Align anew with the next tick."""
-        self.estimator.reset()
-        self._flying = False
+        self._align(in_flight=False)
+
+    def _align(self, in_flight: bool) -> None:
+        self.estimator.reset(in_flight=in_flight)
+        self._flown = self._lost = False
         self._first_usec: int | None = None
-        self._tick = self._first_flown = 0
+        self._tick = self._first_flown = self._falling = 0
         self._last_gps_usec = 0
+        self.guessing = in_flight
+        self.fresh = False
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick, once it is aligned and good enough to fly on."""
         if reader.begun:
-            self.restart()
+            self._align(in_flight=False)
+            self.fresh = True
+        elif self._first_usec is None:
+            self._align(in_flight=True)
         if self._first_usec is None:
             self._first_usec = time_usec
         ticks = self._rate_hz / MICROSECONDS_PER_SECOND
         self._tick = round((time_usec - self._first_usec) * ticks)
+        if self.guessing:
+            self._guess(float(reader.sensed["accelerometer"][0, 2]), time_usec)
         estimator = self.estimator
         estimator.sensed(reader.sensed)
         if tick.gps and reader.gps["fix_type"] >= _FIX_3D:
@@ -89,17 +140,72 @@ class EstimateFeedback:
             if frame.message_id == MAVLINK_MSG_ID_LANDING_TARGET:
                 self._see_load(decode(frame))
         estimate = estimator.tick(self._tick / self._rate_hz)
-        return estimate if self._flying or self._ready() else None
+        if self.guessing or (estimator.in_flight and not self._flown and not self.ready()):
+            return None
+        if not self._only_good:
+            return estimate
+        if not self._flown:
+            return estimate if self.ready() else None
+        if self._tick % CHECK_EVERY == 0:
+            self._check()
+        return None if self._lost else estimate
 
-    def flown(self, controls: Array) -> None:
-        """Note what the rotors are told; the first time, that the vehicle flies."""
-        if not self._flying:
-            self._flying = True
+    def flown(self, controls: Array, armed: bool) -> None:
+        """Note what the rotors are told; the first time armed, that the vehicle flies."""
+        if not armed:
+            self.estimator.command(self._standing)
+            return
+        if not self._flown:
+            self._flown = True
             self._first_flown = self._tick
-            self.estimator.take_off()
+        if self.estimator.held and self._vehicle.initial.start == "hover":
+            self.estimator.take_off(self._hover_speeds)
         if self._log is not None:
             self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
         self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
+
+    def path_from(self, path_from: PathFrom) -> PathFrom:
+        """From where the description has the load at the start, which no sensor shows as well.
+
+        In flight, from where the estimate has it.
+        """
+        start = self._vehicle.initial_load_position
+
+        def make(load: Triple) -> Path:
+            return path_from(load if self.estimator.in_flight else start)
+
+        return make
+
+    def ready(self) -> bool:
+        """Whether it is aligned, and good enough to begin a flight on."""
+        wait = LONGEST_BACKLOG if self._only_good and not self.fresh else ALIGNMENT_TIME
+        if not self.estimator.in_flight and self._tick < round(wait * self._rate_hz):
+            return False
+        health = self.estimator.health()
+        return health.attitude and health.velocity and health.position
+
+    def _guess(self, specific_force: float, time_usec: int) -> None:
+        """Flying or standing: specific_force: m/s², along body z, the rotors being stopped."""
+        falls = specific_force < FALLING * self._vehicle.gravity
+        self._falling = self._falling + 1 if falls else 0
+        if self._falling >= FALLING_SAMPLES:
+            self.guessing = False
+            self._say("the vehicle is in flight: aligning there")
+        elif self._tick > GUESSING_TIME * self._rate_hz:
+            self._align(in_flight=False)
+            self._first_usec = time_usec
+            self._tick = 0
+
+    def _check(self) -> None:
+        health = self.estimator.health()
+        for text in self._watch.changes(health):
+            self._say(text)
+        if health.tilt_std > LOST_TILT or health.position_std > LOST_POSITION:
+            self._lost = True
+            self._say(
+                "the estimate is lost: position to within "
+                f"{health.position_std:.0f} m, tilt to within {health.tilt_std:.2f} rad; rotors stopped"
+            )
 
     def _seconds(self, time_usec: int) -> float:
         """A time of the wire on the filter's clock, s."""
@@ -116,8 +222,32 @@ class EstimateFeedback:
         position = flu_to_frd((target.x, target.y, target.z))
         self.estimator.load_seen(self._seconds(target.time_usec), position, (across, across, along))
 
-    def _ready(self) -> bool:
-        if self._tick < round(ALIGNMENT_TIME * self._rate_hz):
-            return False
-        health = self.estimator.health()
-        return health.attitude and health.velocity and health.position
+
+class TruthBesideEstimate(TruthFeedback):
+    """The law flies on truth; the estimator runs beside it, for its log."""
+
+    plain = False
+
+    def __init__(self, beside: EstimateFeedback, rate_hz: float) -> None:
+        self._beside = beside
+        self._patience = round(LONGEST_WAIT * rate_hz)
+        self._begun = False
+
+    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+        """The truth, from when the estimator has aligned; it is not waited for longer than LONGEST_WAIT."""
+        estimate = self._beside.take(time_usec, tick, reader)
+        truth = super().take(time_usec, tick, reader)
+        if not self._begun and truth is not None:
+            self._patience -= 1
+            waits = self._beside.fresh and self._patience > 0  # not where it may be in flight
+            self._begun = estimate is not None or not waits
+        return truth if self._begun else None
+
+    def flown(self, controls: Array, armed: bool) -> None:
+        """The estimator has to know."""
+        self._beside.flown(controls, armed)
+
+    def restart(self) -> None:
+        """Align anew."""
+        self._beside.restart()
+        self._begun = False

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from controller.hil.ticks import Tick, TickReader
+from controller.reference import Path
 from controller.state import Array
+from sitl_bridge.sensors import Sensors
+from sitl_bridge.vehicle import Vehicle
+
+PathFrom = Callable[[tuple[float, float, float]], Path]
+"""Makes the reference path, given where the load is (m, world) when the law takes over."""
+
+
+def estimates(feedback: str, vehicle: Vehicle) -> bool:
+    """Whether the estimator runs: to fly on it, or beside the truth if the sensors have errors."""
+    return feedback == "estimate" or vehicle.sensors != Sensors()
 
 
 class Feedback(Protocol):
@@ -20,11 +32,14 @@ class Feedback(Protocol):
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick; None while there is none to fly on."""
 
-    def flown(self, controls: Array) -> None:
-        """The tick was answered, armed, with these controls (16,)."""
+    def flown(self, controls: Array, armed: bool) -> None:
+        """The tick was answered with these controls (16,); disarmed, the rotors stand."""
 
     def restart(self) -> None:
         """Another plant, or the same one from its beginning."""
+
+    def path_from(self, path_from: PathFrom) -> PathFrom:
+        """How the reference is made, given where this feedback has the load when the law takes over."""
 
 
 class TruthFeedback:
@@ -38,8 +53,12 @@ class TruthFeedback:
         """The state that the plant says it is in."""
         return reader.estimate if tick.truth else None
 
-    def flown(self, controls: Array) -> None:
+    def flown(self, controls: Array, armed: bool) -> None:
         """Truth does not need to know."""
 
     def restart(self) -> None:
         """Nor does it remember."""
+
+    def path_from(self, path_from: PathFrom) -> PathFrom:
+        """From where the load is."""
+        return path_from

@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import common
 
 from controller import handover
 from controller.allocation import allocation
+from controller.assessment import Assessor, Contact, ExactAssessor
 from controller.designs import EVEN, Emphasis, guided_designs
 from controller.ground.station import Station
 from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Terminate
@@ -37,18 +38,12 @@ from sitl_bridge.vehicle import Vehicle
 
 IDLE_COMMAND = 0.08
 """Rotors of a vehicle that is armed on the ground, as a share of their largest speed."""
-CONTACT_MARGIN = 0.02
-"""m, above rest, up to which a body counts as on the ground."""
-LIFTED = 0.05
-"""m, above rest, from which on the load counts as lifted, and its law takes over."""
+ASSESSMENT_PERIOD = 0.1
+"""s of the plant's time between two looks at the health of the feedback."""
 REACH = 0.3
 """m, beyond a hanging load's distance, to which the vehicle pulls to lift the load off."""
 PICK_UP_SPEED = 0.4
 """m/s, largest, at which it does."""
-
-
-LOST_LOAD = 1.1
-"""Of the longest cable, distance at which the load is not on it any more."""
 THRUST_SHARE = 0.85
 """Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
 LEAST_ACCELERATION = 0.5
@@ -91,8 +86,12 @@ class GuidedAutopilot:
         station: Station,
         redesigner: Redesigner,
         controls: Array,
+        assessor: Assessor | None = None,
     ) -> None:
+        """assessor: of the feedback, by default of one that is the truth."""
         self.station = station
+        self._assessor = assessor or ExactAssessor(vehicle)
+        self._next_assessment = -math.inf
         self._vehicle = vehicle
         self._period = 1.0 / rate_hz
         self._redesigner = redesigner
@@ -110,13 +109,6 @@ class GuidedAutopilot:
         """The law that flies; None on the ground"""
         self._memory: Memory = engaged_memory(np.zeros(3))
         self._step: Callable[[], int] = self._bound(Body.VEHICLE)  # compiled code is loaded now
-        ground = vehicle.ground
-        # A cable that is stretched by all that the rotors can pull is as long as one can be.
-        self._longest_cable = LOST_LOAD * (vehicle.cable.rest_length + thrust / vehicle.cable.stiffness)
-        self._vehicle_rest = self._load_rest = -math.inf
-        if ground is not None:
-            self._vehicle_rest = ground.height - min(leg[2] for leg in vehicle.airframe.legs)
-            self._load_rest = ground.height + vehicle.load.radius
         self._pulling: tuple[Target, Goto] | None = None
         """A target for the load, and what the vehicle does for it while the load lies"""
         self._view: VehicleView | None = None
@@ -160,15 +152,15 @@ class GuidedAutopilot:
         """One control step on an estimate (18,), eq. 31."""
         self._estimate[:] = estimate
         self._heard = now
-        view, first = self._seen(estimate, time_usec)
-        if first and not view.vehicle_on_ground and any((*view.velocity, *view.load_velocity)):
-            self.station.machine.resume(view, now)  # held by the plant it would be at rest
+        view, contact, first = self._seen(estimate, time_usec, now)
+        if first and contact.in_flight:
+            self.station.machine.resume(view, now)
         target = self.station.update(view, now)
         self._take_designs()
-        self._fly(target, estimate, view)
+        self._fly(target, estimate, view, contact)
 
-    def _seen(self, estimate: Array, time_usec: int) -> tuple[VehicleView, bool]:
-        """The view of an estimate, and whether it is the first."""
+    def _seen(self, estimate: Array, time_usec: int, now: float) -> tuple[VehicleView, Contact, bool]:
+        """The view of an estimate, what touches what in it, and whether it is the first."""
         x = estimate.tolist()
         attitude = quaternion_from_euler((x[15], x[16], x[17]))
         position, load = (x[0], x[1], x[2]), (x[3], x[4], x[5])
@@ -180,23 +172,26 @@ class GuidedAutopilot:
         view.position, view.load_position = position, load
         view.velocity, view.load_velocity = (x[6], x[7], x[8]), (x[9], x[10], x[11])
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
-        length = math.dist(position, load)
-        view.cable_taut = length >= self._vehicle.cable.rest_length
-        if length > self._longest_cable and view.load_attached:
+        contact = self._assessor.contact(estimate)
+        if view.load_attached and not contact.load_attached:  # for good: it may well lie within reach again
             view.load_attached = False
-            self.station.announce(Notice(WARNING, "The load is lost: flying without it"), self._heard)
-        view.vehicle_on_ground = position[2] < self._vehicle_rest + CONTACT_MARGIN
-        view.load_on_ground = load[2] < self._load_rest + CONTACT_MARGIN
+            self.station.announce(Notice(WARNING, "The load is lost: flying without it"), now)
+        view.vehicle_on_ground, view.load_on_ground = contact.vehicle_on_ground, contact.load_on_ground
+        view.cable_taut = contact.cable_taut
+        if first or view.time >= self._next_assessment:
+            self._next_assessment = view.time + ASSESSMENT_PERIOD
+            for text in self._assessor.assess(view):
+                self.station.announce(Notice(WARNING, text), now)
         view.hil_age = 0.0
         view.throttle = float(self._controls[: len(self._vehicle.rotors)].mean()) if self.armed else 0.0
-        return view, first
+        return view, contact, first
 
-    def _fly(self, target: Target, estimate: Array, view: VehicleView) -> None:
+    def _fly(self, target: Target, estimate: Array, view: VehicleView, contact: Contact) -> None:
         if isinstance(target, Idle | Terminate):
             self._law = None
             self._controls[: len(self._vehicle.rotors)] = IDLE_COMMAND
             return
-        body = self._body_for(target, view)
+        body = self._body_for(target, contact)
         if body is not self._law:
             self._engage(body, estimate)
         if body is not target.body:
@@ -204,12 +199,11 @@ class GuidedAutopilot:
         self._trajectory.advance(target, self._limits(), float(self._memory["ticks"][0]) * self._period)
         self._step()
 
-    def _body_for(self, target: Goto | Follow | Land, view: VehicleView) -> Body:
+    def _body_for(self, target: Goto | Follow | Land, contact: Contact) -> Body:
         """Which law is to fly: the load's when the load hangs, and for as long as it is asked for."""
         if target.body is Body.VEHICLE or self._law is Body.LOAD:
             return target.body
-        lifted = view.cable_taut and view.load_position[2] > self._load_rest + LIFTED
-        return Body.LOAD if lifted else Body.VEHICLE
+        return Body.LOAD if contact.load_lifted else Body.VEHICLE
 
     def _pull(self, target: Goto | Follow | Land, view: VehicleView) -> Goto:
         """The vehicle alone rises above a load that lies, until it hangs."""

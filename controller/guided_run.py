@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from controller.assessment import Assessor
 from controller.ground_link import GroundLink, GroundOptions
 from controller.guided import GuidedAutopilot
 from controller.redesign import DesignProcess
@@ -26,9 +27,11 @@ class Guided:
         instance: int,
         options: GroundOptions | None,
         say: Callable[[str], None],
+        assessor: Assessor | None = None,
     ) -> None:
         """Raises OSError when a port is taken, KeyFileError for a key that is none."""
         self._vehicle = vehicle
+        self._assessor = assessor
         self._rate_hz = rate_hz
         self._link = GroundLink(vehicle, instance, options or GroundOptions(), say)
         self._designer = DesignProcess(vehicle, rate_hz)
@@ -38,7 +41,7 @@ class Guided:
     def autopilot(self, controls: Array) -> GuidedAutopilot:
         """The autopilot around its rotor commands (16,)."""
         self._pilot = GuidedAutopilot(
-            self._vehicle, self._rate_hz, self._link.station, self._designer, controls
+            self._vehicle, self._rate_hz, self._link.station, self._designer, controls, self._assessor
         )
         return self._pilot
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from controller.autopilot import Autopilot, PathFrom
+from controller.autopilot import Autopilot
 from controller.awake import AwakeClock
 from controller.designs import ON_ESTIMATE
+from controller.feedback import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, new_session
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
@@ -18,8 +19,8 @@ from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from controller.assessment import Assessor
     from controller.estimate_log import EstimateLog
-    from controller.feedback import Feedback
     from controller.ground_link import GroundOptions
     from controller.guided_run import Guided
 
@@ -56,17 +57,22 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     log: EstimateLog | None = None
     feedback: Feedback | None = None
     design = options.design
+    assessor: Assessor | None = None
     if options.feedback == "estimate":
-        log, feedback = _estimating(options)
+        log, feedback, assessor = _estimating(options, speaker)
         design = ON_ESTIMATE if design == "default" else design
+    elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
+        log, feedback = _estimating_beside(options)
     guided: Guided | None = None
     if options.path_from is None:
         from controller.guided_run import Guided
 
-        guided = Guided(options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say)
+        guided = Guided(
+            options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say, assessor
+        )
         session = new_session(guided.autopilot, options.instance, speaker.say, feedback, options.rate_hz)
     else:
-        path_from = options.path_from
+        path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
         session = new_session(
             lambda controls: Autopilot(options.vehicle, design, options.rate_hz, path_from, controls),
             options.instance,
@@ -94,13 +100,29 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     return outcome
 
 
-def _estimating(options: ControllerOptions) -> tuple[EstimateLog | None, Feedback]:
-    """The estimator and its log; imported only where they are flown on."""
+def _estimating(
+    options: ControllerOptions, speaker: Speaker
+) -> tuple[EstimateLog | None, Feedback, Assessor]:
+    """The estimator, its log and what judges it; imported only where they are flown on."""
     from controller.estimate_feedback import EstimateFeedback
+    from controller.estimate_health import EstimateAssessor
     from controller.estimate_log import EstimateLog
 
     log = None if options.out is None else EstimateLog(options.out)
-    return log, EstimateFeedback(options.vehicle, options.rate_hz, log)
+    alone = options.path_from is not None
+    feedback = EstimateFeedback(options.vehicle, options.rate_hz, log, speaker.say, only_good=alone)
+    return log, feedback, EstimateAssessor(feedback)
+
+
+def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedback]:
+    """The estimator beside the truth, and its log."""
+    from controller.estimate_feedback import EstimateFeedback, TruthBesideEstimate
+    from controller.estimate_log import EstimateLog
+
+    assert options.out is not None
+    log = EstimateLog(options.out)
+    beside = EstimateFeedback(options.vehicle, options.rate_hz, log)
+    return log, TruthBesideEstimate(beside, options.rate_hz)
 
 
 def _loop(

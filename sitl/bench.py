@@ -38,7 +38,8 @@ FULL = (
     "air.turbulence.wind_at_6_m=7.7",
 )
 """What makes `iris`, which has ground, rotor lag, drag and a battery, a plant with everything on."""
-ON_ESTIMATE = ("--feedback", "estimate")
+ON_TRUTH, ON_ESTIMATE = ("--feedback", "truth"), ("--feedback", "estimate")
+WARMING_TICKS = 250
 
 
 def free_udp_port() -> int:
@@ -83,10 +84,38 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     return len(simulation.datagram()), len(writer.answer(4000, True))
 
 
-def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ()) -> dict[str, Any]:
+def estimator_update_us(vehicle: Vehicle) -> float:
+    """Time of one tick of the estimator, us: inertial sensors, magnetometer, barometer; GPS at its rate."""
+    from controller.estimate_feedback import tuning_for
+    from controller.estimator.filter import Estimator
+    from sitl_bridge.vehicle import hover_rotor_speeds
+
+    tuning = tuning_for(vehicle, RATE_HZ)
+    estimator = Estimator(vehicle, 1.0 / RATE_HZ, tuning)
+    speeds = np.array(hover_rotor_speeds(vehicle))
+    still, up = (0.0, 0.0, 0.0), (0.0, 0.0, vehicle.gravity)
+    elapsed = 0.0
+    for tick in range(STEPS // 2):
+        now = tick / RATE_HZ
+        east, north, height = tuning.field
+        began = time.perf_counter()
+        estimator.imu(up, still)
+        estimator.magnetometer((east + 1e-9 * (tick % 3), north, height))
+        estimator.barometer(0.0)
+        if tick % round(RATE_HZ * tuning.gps_period) == 0:
+            estimator.gps(now, still, still)
+        estimator.tick(now)
+        estimator.command(speeds)
+        elapsed += (time.perf_counter() - began) if estimator.flying else 0.0
+        if tick == WARMING_TICKS:
+            estimator.take_off(speeds)
+    return elapsed / (STEPS // 2 - WARMING_TICKS - 1) * 1e6
+
+
+def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ON_TRUTH) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     port = free_udp_port()
-    sensors = ["--set", "sensors.preset=consumer"] if feedback else []
+    sensors = ["--set", "sensors.preset=consumer"] if feedback == ON_ESTIMATE else []
     common = ["--scenario", scenario, "--rate", str(RATE_HZ), *sensors, *more]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
     controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
@@ -111,6 +140,7 @@ def launch_to_first_command_s(feedback: Sequence[str] = ()) -> float:
 def bench(repeats: int) -> dict[str, float]:
     """Medians over so many repeats; progress on standard error."""
     vehicle = load_vehicle("paper", ["cable.rest_length=10"])
+    consumer = load_vehicle("paper", ["cable.rest_length=10", "sensors.preset=consumer"])
     full = load_vehicle("iris", FULL)
     full_options = ["--vehicle", "iris", *(word for change in FULL for word in ("--set", change))]
     sizes = datagram_sizes(vehicle)
@@ -121,6 +151,7 @@ def bench(repeats: int) -> dict[str, float]:
         measured = {
             "physics_step_us": physics_step_us(vehicle),
             "control_step_us": control_step_us(vehicle),
+            "estimator_update_us": estimator_update_us(consumer),
             "lockstep_tick_us": 1e6 / (factor * RATE_HZ),
             "round_trip_us": round_trip_us(*sizes, TRIPS),
             "real_time_factor": factor,

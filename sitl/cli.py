@@ -268,8 +268,8 @@ def _control(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--feedback",
         choices=("truth", "estimate"),
-        default="truth",
-        help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth)",
+        help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth for "
+        "vehicle paper in the paper's scenarios, else estimate)",
     )
 
 
@@ -362,15 +362,16 @@ def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
     return parse_address(arguments.hil or kind, udp_port, tcp_port)
 
 
-def _what_to_fly(arguments: argparse.Namespace) -> tuple[Vehicle, Scenario | None]:
-    """Vehicle and scenario of `plant` and `controller`."""
+def _what_to_fly(arguments: argparse.Namespace, of_plant: bool = False) -> tuple[Vehicle, Scenario | None]:
+    """Vehicle and scenario of `plant` or `controller`."""
     overrides = _overrides(arguments)
     if arguments.scenario is None:
         return load_vehicle(arguments.vehicle or "paper", overrides), None
-    from sitl.scenario import load_scenario, scenario_vehicle
+    from sitl.scenario import load_scenario, plant_vehicle, scenario_vehicle
 
     scenario = load_scenario(arguments.scenario)
-    return scenario_vehicle(scenario, arguments.vehicle, overrides), scenario
+    its_vehicle = plant_vehicle if of_plant else scenario_vehicle
+    return its_vehicle(scenario, arguments.vehicle, overrides), scenario
 
 
 def _overrides(arguments: argparse.Namespace) -> list[str]:
@@ -388,7 +389,7 @@ def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
 def _plant(arguments: argparse.Namespace) -> int:
     if arguments.speed is not None and arguments.clock != "lockstep":
         raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
-    vehicle, scenario = _what_to_fly(arguments)
+    vehicle, scenario = _what_to_fly(arguments, of_plant=True)
     from sitl_bridge.plant.run import PlantOptions, run
 
     speaker = Speaker("plant", events=arguments.until_eof)
@@ -419,7 +420,7 @@ def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
     from sitl.hold import check_design
-    from sitl.scenario import GroundControl, Hover
+    from sitl.scenario import GroundControl, Hover, usual_feedback
 
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
@@ -438,7 +439,7 @@ def _controller(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         seed=arguments.seed,
         ground=_ground_options(arguments),
-        feedback=arguments.feedback,
+        feedback=arguments.feedback or usual_feedback(scenario, vehicle),
         out=arguments.out,
     )
     outcome = run(options, speaker, stop)

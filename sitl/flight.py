@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from controller.feedback import estimates
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.scenario import GroundControl, Scenario, scenario_vehicle
+from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
@@ -35,7 +36,8 @@ class FlightOptions:
     rate_hz: float
     seed: int
     design: str
-    feedback: str
+    feedback: str | None
+    """None: as usual, see `scenario.usual_feedback`."""
     duration_s: float | None
     drop_percent: float
     instance: int
@@ -62,7 +64,9 @@ class FlightOptions:
         if self.out is not None:
             plant += ["--out", str(self.out)]
         other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
-        controller = [*common, "--hil", str(other_end), "--design", self.design, "--feedback", self.feedback]
+        controller = [*common, "--hil", str(other_end), "--design", self.design]
+        if self.feedback is not None:
+            controller += ["--feedback", self.feedback]
         if self.out is not None:
             controller += ["--out", str(self.out)]
         return plant, [*controller, *self.ground]
@@ -72,7 +76,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
     """Fly; returns the summary, which is also in the output folder. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    flown = scenario_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    flown = plant_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
     checked(scenario.faults, flown)
     assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)
@@ -103,11 +107,12 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
     from sitl.report import write_report
 
+    feedback = options.feedback or usual_feedback(scenario, vehicle)
     facts = {
         "scenario": options.scenario_name,
         "vehicle": vehicle.name,
         "design": options.design,
-        "feedback": options.feedback,
+        "feedback": feedback,
         "seed": options.seed,
         "clock": options.clock,
         "rate_hz": options.rate_hz,
@@ -118,4 +123,4 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
     path = path_from(start)
-    return write_report(options.out, facts, path, vehicle if options.feedback == "estimate" else None)
+    return write_report(options.out, facts, path, vehicle if estimates(feedback, vehicle) else None)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sitl.flight import FlightOptions
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.scenario import scenario_vehicle
+from sitl.scenario import plant_vehicle, scenario_vehicle
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle import DescriptionError
 
@@ -38,7 +38,7 @@ def check_design(design: str) -> None:
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     """Run both processes until asked to stop; returns what went wrong before that, if something did."""
     scenario_vehicle(options.scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    scenario_vehicle(options.scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    plant_vehicle(options.scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
     line = ProgressLine(sys.stderr)
 
     def show(event: dict[str, Any]) -> None:

@@ -73,6 +73,8 @@ def flight_metrics(times: Array, load: Array, reference: Array) -> dict[str, Any
     last = times >= end - SETTLED_WINDOW
     return {
         "settled": bool(end >= SETTLED_WINDOW and np.all(errors[last] <= tolerance)),
+        "settled_tolerance_m": tolerance,
+        "largest_error_at_end_m": float(errors[last].max()),
         "settling_time_2pct_s": settling_time(times, errors, SETTLED_SHARE * step) if is_step else None,
         "settling_time_1cm_s": settling_time(times, errors, SETTLED_DISTANCE) if stands_still else None,
         "overshoot_pct": overshoot_pct(load, load[0], reference[0]) if stands_still else None,

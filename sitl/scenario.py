@@ -71,7 +71,11 @@ class Scenario(Section):
     description: str = quantity("-", "one line", "")
     vehicle: str = quantity("-", "name or file of the vehicle")
     set: tuple[str, ...] = quantity("-", "overrides of the vehicle, KEY=VALUE", ())
+    plant_set: tuple[str, ...] = quantity("-", "overrides that only the plant has, KEY=VALUE", ())
     duration: float | None = quantity("s", "how long it flies; without it, until it is stopped", None, gt=0)
+    feedback: Literal["truth", "estimate"] | None = quantity(
+        "-", "what the law flies on, if not as usual", None
+    )
     reference: Reference
     faults: Faults = Faults()
 
@@ -90,6 +94,22 @@ def load_scenario(name_or_file: str) -> Scenario:
 def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
     """The scenario's vehicle, with what the command line says on top."""
     return load_vehicle(vehicle or scenario.vehicle, [*scenario.set, *overrides])
+
+
+def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
+    """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
+    return scenario_vehicle(scenario, vehicle, [*scenario.plant_set, *overrides])
+
+
+def usual_feedback(scenario: Scenario | None, vehicle: Vehicle) -> str:
+    """What a law flies on unless told otherwise: the paper's vehicle on truth, as the paper has it.
+
+    Everything else, and whatever ground control flies, on the estimate from the sensors.
+    """
+    if scenario is not None and scenario.feedback is not None:
+        return scenario.feedback
+    guided = scenario is not None and isinstance(scenario.reference, GroundControl)
+    return "truth" if vehicle.name == "paper" and not guided else "estimate"
 
 
 def _folder() -> Any:

@@ -1,4 +1,8 @@
-"""The start: attitude from the mean specific force and magnetic field, position from GPS."""
+"""The start: attitude from the mean specific force and magnetic field, position from GPS.
+
+At rest there is time to average. In flight there is none: one sample of each sensor starts the filter, with
+honest doubt, and GPS says later where it is.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,19 @@ from typing import Any
 
 from controller.estimator.layout import (
     ATTITUDE,
+    BARO_OFFSET,
     ERROR_SIZE,
     FLYING,
     GYRO_BIAS,
     LOAD,
+    LOAD_ON_CABLE,
+    LOAD_ON_GROUND,
     LOAD_VELOCITY,
     NOMINAL_SIZE,
+    POSITION,
     SENSOR_COUNT,
     STANDING,
+    VELOCITY,
     X_ATTITUDE,
     X_BARO_OFFSET,
     X_GYRO_BIAS,
@@ -29,7 +38,9 @@ from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
 IN_FLIGHT_TILT_STD = 0.15
-"""rad: in flight the mean specific force is up only on average."""
+"""rad: in flight the specific force is up only on average."""
+IN_FLIGHT_SPEED_STD = 5.0  # m/s
+UNKNOWN_PLACE_STD = 1e3  # m
 
 
 @kernel
@@ -40,10 +51,10 @@ def _sane(vector: Any) -> bool:
 
 @kernel
 def align(f: Filter, given: Any) -> None:
-    """Gather samples; when there are enough, and a GPS fix, set the state and start the filter.
+    """Gather samples; when there are enough, set the state and start the filter.
 
-    At rest the specific force is exactly up and the gyroscope shows its bias. In flight it is up on average,
-    and the load hangs somewhere below.
+    At rest, the specific force is exactly up and the gyroscope shows its bias; a GPS fix says where. In
+    flight the specific force is up on average, and the load hangs somewhere below.
     """
     p, m, x = f.p, f.m, f.x
     if given.has_imu and _sane(given.accelerometer) and _sane(given.gyroscope):
@@ -64,7 +75,8 @@ def align(f: Filter, given: Any) -> None:
         while m.next_clone < given.time + 0.5 * p.period:
             m.next_clone += p.clone_interval
     m.time = given.time
-    if m.align_count < p.align_samples or m.align_magnetometer < 1 or not m.align_gps:
+    enough = m.in_flight or (m.align_count >= p.align_samples and m.align_gps)
+    if not enough or m.align_count < 1 or m.align_magnetometer < 1:
         return
     if not given.has_altitude or not abs(given.altitude) < 1e6:
         return
@@ -104,9 +116,17 @@ def align(f: Filter, given: Any) -> None:
         start_hanging(f, 0.3, 1.0)
         f.P[ATTITUDE, ATTITUDE] = IN_FLIGHT_TILT_STD**2
         f.P[ATTITUDE + 1, ATTITUDE + 1] = IN_FLIGHT_TILT_STD**2
+        if not m.align_gps:
+            x[X_BARO_OFFSET] = 0.0
+            set_part(f, BARO_OFFSET, 1, UNKNOWN_PLACE_STD)
+            set_part(f, POSITION, 3, UNKNOWN_PLACE_STD)
+            set_part(f, VELOCITY, 3, IN_FLIGHT_SPEED_STD)
+            m.next_clone = m.time
         m.vehicle_mode = FLYING
     else:
         m.vehicle_mode = STANDING
+        m.grounded = p.starts_on_ground
+        m.load_mode = LOAD_ON_GROUND if p.starts_on_ground else LOAD_ON_CABLE
 
 
 @kernel

@@ -155,6 +155,8 @@ def gps(f: Filter, given: Any) -> None:
         m.next_clone += f.p.clone_interval
     if slot < 0:
         return
+    m.align_gps = True
+    m.adrift = False
     base = slot * CLONE_ROWS
     if m.time - max(m.last_used[GPS_POSITION], m.last_used[GPS_VELOCITY]) > OUTAGE:
         m.slip_until = m.time + SLIPPING

@@ -13,7 +13,6 @@ from controller.estimator import intake, step
 from controller.estimator.layout import (
     ALIGNING,
     ERROR_SIZE,
-    EULER_OUT,
     FILTER,
     FLYING,
     INPUT,
@@ -29,10 +28,13 @@ from controller.estimator.layout import (
     Array,
 )
 from controller.estimator.tuning import CONSUMER, Tuning, parameters
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
-YAW = EULER_OUT + 2
 Sequence3 = tuple[float, float, float] | Array
+
+
+REFUSED_TIME = 1.0
+"""s for which GPS is refused, until that is a state of affairs and not an outlier."""
 
 
 class SensorHealth(NamedTuple):
@@ -64,6 +66,9 @@ class Health(NamedTuple):
     """no GPS for a while: position and velocity drift"""
     gps_glitch: bool
     """GPS comes, but is refused"""
+    gps_refused: bool
+    """it has been for seconds"""
+    load_released: bool
     position_std: float
     """m, horizontal"""
     height_std: float
@@ -111,6 +116,9 @@ class Estimator:
         self._record[...] = np.zeros((), dtype=INPUT)
         self._output[...] = 0.0
         self.memory["in_flight"] = in_flight
+        if in_flight:
+            speeds = hover_rotor_speeds(self.vehicle)
+            self.memory["rotor_speed"][: len(speeds)] = speeds
 
     def imu(self, accelerometer: Sequence3, gyroscope: Sequence3) -> None:
         """Specific force (m/s²) and angular rate (rad/s), body FLU, sampled at this tick."""
@@ -172,8 +180,13 @@ class Estimator:
         self._rotor_speed[: len(rotor_speed)] = rotor_speed
         self._command()
 
-    def take_off(self) -> None:
-        """Nothing holds the vehicle any more: it flies from the next tick on."""
+    def take_off(self, rotor_speed: Array | None = None) -> None:
+        """Nothing holds the vehicle any more: it flies from the next tick on.
+
+        rotor_speed: rad/s (n,), that the rotors have already; by default none.
+        """
+        if rotor_speed is not None:
+            self.memory["rotor_speed"][: len(rotor_speed)] = rotor_speed
         self._change(FLYING, int(self.memory["load_mode"]))
 
     def landed(self) -> None:
@@ -193,6 +206,36 @@ class Estimator:
         self._change(int(self.memory["vehicle_mode"]), LOAD_RELEASED)
 
     @property
+    def in_flight(self) -> bool:
+        """Whether it was aligned, or is to be, in flight."""
+        return bool(self.memory["in_flight"])
+
+    @property
+    def flying(self) -> bool:
+        """Whether it takes the vehicle to be in the air, and not held."""
+        return int(self.memory["vehicle_mode"]) == FLYING
+
+    @property
+    def held(self) -> bool:
+        """Whether it takes the vehicle to be held in the air, at its start."""
+        return self.aligned and not self.flying and not self.memory["grounded"]
+
+    @property
+    def grounded(self) -> bool:
+        """Whether it takes the vehicle to stand on the ground."""
+        return bool(self.memory["grounded"]) and not self.flying
+
+    @property
+    def load_mode(self) -> int:
+        """LOAD_ON_CABLE, LOAD_ON_GROUND or LOAD_RELEASED."""
+        return int(self.memory["load_mode"])
+
+    @property
+    def tension(self) -> float:
+        """Of the cable, N."""
+        return float(self.memory["tension"])
+
+    @property
     def aligned(self) -> bool:
         """Whether the start-up alignment is done."""
         return int(self.memory["vehicle_mode"]) != ALIGNING
@@ -203,23 +246,21 @@ class Estimator:
 
     @property
     def nominal(self) -> Array:
-        """The nominal state (33,), see layout; attitude as a quaternion, load relative to the vehicle."""
+        """The nominal state (35,), see layout; attitude as a quaternion, load relative to the vehicle."""
         return np.asarray(self._filter["x"][0])
 
     @property
     def error_covariance(self) -> Array:
-        """Covariance (32, 32) of the error state, see layout.PARTS."""
+        """Covariance (34, 34) of the error state, see layout.PARTS."""
         return np.asarray(self._filter["P"][0])
 
     def covariance(self) -> Array:
         """Covariance (18, 18) of `state()`, eq. 31.
 
-        Of the heading it has what the filter cannot learn too: the magnetometer's lasting error.
+        The heading is as uncertain as the magnetometer's lasting error, of which a hover shows nothing.
         """
         selector = eq31_jacobian(self._output[15], self._output[16])
-        out = np.asarray(selector @ self.error_covariance @ selector.T)
-        out[YAW, YAW] += self.tuning.heading_bias_std**2
-        return out
+        return np.asarray(selector @ self.error_covariance @ selector.T)
 
     def health(self) -> Health:
         """A summary for arming, failsafes, SYS_STATUS and ESTIMATOR_STATUS."""
@@ -244,6 +285,7 @@ class Estimator:
         load = std("load", slice(0, 3))
         gps_age = min(sensors["gps_position"].age, sensors["gps_velocity"].age)
         hanging = int(m["load_mode"]) == LOAD_ON_CABLE
+        refused = int(m["rejected_in_row"][SENSORS.index("gps_position")])
         return Health(
             aligned=self.aligned,
             attitude=self.aligned and tilt < 0.1,
@@ -251,7 +293,9 @@ class Estimator:
             position=self.aligned and position < 3.0,
             load=self.aligned and hanging and load < 0.3 * self.vehicle.hover_length,
             dead_reckoning=gps_age > 1.0,
-            gps_glitch=bool(m["rejected_in_row"][SENSORS.index("gps_position")] > 0),
+            gps_glitch=refused > 0,
+            gps_refused=refused * self.tuning.gps_period > REFUSED_TIME,
+            load_released=int(m["load_mode"]) == LOAD_RELEASED,
             position_std=position,
             height_std=height,
             velocity_std=velocity,
@@ -263,7 +307,7 @@ class Estimator:
 
 
 def eq31_jacobian(roll: float, pitch: float) -> Array:
-    """How the error state (32) moves the state of eq. 31 (18): Jacobian (18, 32)."""
+    """How the error state (34) moves the state of eq. 31 (18): Jacobian (18, 34)."""
     jacobian = np.zeros((OUTPUT_SIZE, ERROR_SIZE))
     identity = np.eye(3)
     jacobian[0:3, PARTS["position"]] = identity

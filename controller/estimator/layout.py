@@ -24,13 +24,13 @@ X_POSITION, X_VELOCITY, X_ATTITUDE, X_RATES, X_GYRO_BIAS, X_ACCEL_BIAS, X_BARO_O
     16,
     19,
 )
-X_LOAD, X_LOAD_VELOCITY, X_FORCE, X_LOAD_WIND, X_LOAD_MASS = 20, 23, 26, 29, 32
-NOMINAL_SIZE = 33
+X_LOAD, X_LOAD_VELOCITY, X_FORCE, X_LOAD_WIND, X_LOAD_MASS, X_MAG_BIAS = 20, 23, 26, 29, 32, 33
+NOMINAL_SIZE = 35
 
 # Error state: the same parts, the attitude with three numbers.
 POSITION, VELOCITY, ATTITUDE, RATES, GYRO_BIAS, ACCEL_BIAS, BARO_OFFSET = 0, 3, 6, 9, 12, 15, 18
-LOAD, LOAD_VELOCITY, FORCE, LOAD_WIND, LOAD_MASS = 19, 22, 25, 28, 31
-ERROR_SIZE = 32
+LOAD, LOAD_VELOCITY, FORCE, LOAD_WIND, LOAD_MASS, MAG_BIAS = 19, 22, 25, 28, 31, 32
+ERROR_SIZE = 34
 
 PARTS = {
     "position": slice(0, 3),
@@ -45,9 +45,11 @@ PARTS = {
     "force": slice(25, 28),
     "load_wind": slice(28, 31),
     "load_mass": slice(31, 32),
+    "mag_bias": slice(32, 34),
 }
 """Where each part lies in the error state and its covariance. `force`: specific force of everything
-unmodelled on the vehicle, m/s²; `load_wind`: N; `load_mass`: logarithm of its ratio to the description's."""
+unmodelled on the vehicle, m/s²; `load_wind`: N; `load_mass`: logarithm of its ratio to the description's;
+`mag_bias`: the magnetometer's lasting error along body x and y, as a part of the whole field."""
 
 # Sensors, in the order of the health arrays.
 ACCELEROMETER, GYROSCOPE, MAGNETOMETER, BAROMETER, GPS_POSITION, GPS_VELOCITY, TRACKER = range(7)
@@ -91,6 +93,11 @@ PARAMETERS = np.dtype(
         ("rest_length", "f8"),
         ("two_way", "b1"),
         ("has_ground", "b1"),
+        ("starts_on_ground", "b1"),
+        ("standing_height", "f8"),
+        ("lying_height", "f8"),
+        ("vehicle_drag", "f8", 2),
+        ("load_drag", "f8", 2),
         ("rotor_count", "i8"),
         ("rotor_x", "f8", MOST_ROTORS),
         ("rotor_y", "f8", MOST_ROTORS),
@@ -108,6 +115,8 @@ PARAMETERS = np.dtype(
         ("gate", "f8", SENSOR_COUNT),
         ("force_std", "f8"),
         ("force_time", "f8"),
+        ("gust_std", "f8"),
+        ("gust_density", "f8"),
         ("load_force_density", "f8"),
         ("torque_density", "f8"),
         ("gyro_bias_walk", "f8"),
@@ -121,7 +130,12 @@ PARAMETERS = np.dtype(
         ("align_samples", "i8"),
     ]
 )
-"""What the filter needs of vehicle and tuning; see `tuning`. Densities are per square root of hertz."""
+"""What the filter needs of vehicle and tuning; see `tuning`. Densities are per square root of hertz.
+
+standing_height, lying_height: m, world, of vehicle and load at rest on the ground; *_drag: linear (N s/m) and
+quadratic (N s²/m²); gust_*: of white force on the vehicle beside the coloured one, m/s² as an accelerometer
+sees it and as the velocity feels it.
+"""
 
 MEMORY = np.dtype(
     [
@@ -133,6 +147,9 @@ MEMORY = np.dtype(
         ("align_magnetometer", "i8"),
         ("align_gps", "b1"),
         ("in_flight", "b1"),
+        ("grounded", "b1"),
+        ("contact_time", "f8"),
+        ("lying_time", "f8"),
         ("rotor_speed", "f8", MOST_ROTORS),
         ("thrust", "f8"),
         ("commands", "f8", (COMMAND_HISTORY, MOST_ROTORS)),
@@ -141,6 +158,7 @@ MEMORY = np.dtype(
         ("slack_time", "f8"),
         ("pull", "f8", 3),
         ("pull_time", "f8"),
+        ("hung", "f8", 2),
         ("load_resets", "i8"),
         ("stale_count", "i8"),
         ("last_magnetometer", "f8", 3),
@@ -151,7 +169,8 @@ MEMORY = np.dtype(
         ("next_load_clone", "f8"),
         ("slip", "f8", 6),
         ("slip_until", "f8"),
-        ("height_suspicion", "f8"),
+        ("adrift", "b1"),
+        ("height_suspicion", "f8"),  # running mean of normalised GPS height innovations
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
         ("normalised", "f8", (SENSOR_COUNT, 3)),
@@ -166,6 +185,9 @@ MEMORY = np.dtype(
 )
 """What the filter remembers besides state and covariance.
 
+grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
+something below has carried the vehicle or the load; hung: m, world, where the load hung last with all its
+weight.
 innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
 within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """

@@ -1,7 +1,8 @@
 """How vehicle and load move between two ticks, and what that does to the covariance.
 
-The thrust and the moments are known from the rotor commands; the cable's force from its elongation; what is
-left on the vehicle is one coloured specific force, the state `force` (Ornstein-Uhlenbeck). The inertial
+The thrust and the moments are known from the rotor commands, the cable's force from its elongation, drag in
+still air from the velocity; what is left on the vehicle is one coloured specific force, the state `force`
+(Ornstein-Uhlenbeck), and white gusts. The inertial
 sensors are measurements of this motion and drive nothing, so their noise enters the filter once and is
 correlated with nothing.
 """
@@ -123,6 +124,14 @@ def cable(f: Filter, jacobian: Array) -> tuple[float, float, float]:
 
 
 @kernel
+def drag_rate(coefficients: Any, mass: float, vx: float, vy: float, vz: float) -> float:
+    """Drag in still air as a rate, 1/s: the deceleration is this times the velocity (m/s)."""
+    if coefficients[0] == 0.0 and coefficients[1] == 0.0:
+        return 0.0
+    return float((coefficients[0] + coefficients[1] * math.sqrt(vx * vx + vy * vy + vz * vz)) / mass)
+
+
+@kernel
 def rotors(f: Filter, elapsed: float, wrench: Array) -> None:
     """Advance the rotors by `elapsed` s towards the command under way; write the mean wrench meanwhile.
 
@@ -204,12 +213,20 @@ def _fly(f: Filter, step: float, wrench: Array, jacobian: Array) -> None:
     ratio = math.exp(x[X_LOAD_MASS])
     load_mass = p.load_mass * ratio
     hanging = m.load_mode == LOAD_ON_CABLE
+    vx, vy, vz = x[X_VELOCITY], x[X_VELOCITY + 1], x[X_VELOCITY + 2]
+    sx, sy, sz = x[X_LOAD_VELOCITY], x[X_LOAD_VELOCITY + 1], x[X_LOAD_VELOCITY + 2]
+    brake = drag_rate(p.vehicle_drag, p.vehicle_mass, vx, vy, vz)
+    load_brake = drag_rate(p.load_drag, load_mass, vx + sx, vy + sy, vz + sz) if hanging else 0.0
     # Translation: forces in the middle of the step.
     fx, fy, fz = cable(f, jacobian)
     mean = _mean_force(p, step)  # of the coloured force over the step, as a fraction of its start
     gx, gy, gz = r02 * lift, r12 * lift, r22 * lift
-    ux, uy, uz = x[X_FORCE] * mean, x[X_FORCE + 1] * mean, x[X_FORCE + 2] * mean
-    dx, dy, dz = x[X_LOAD_WIND] / load_mass, x[X_LOAD_WIND + 1] / load_mass, x[X_LOAD_WIND + 2] / load_mass
+    ux = x[X_FORCE] * mean - brake * vx
+    uy = x[X_FORCE + 1] * mean - brake * vy
+    uz = x[X_FORCE + 2] * mean - brake * vz
+    dx = x[X_LOAD_WIND] / load_mass - load_brake * (vx + sx)
+    dy = x[X_LOAD_WIND + 1] / load_mass - load_brake * (vy + sy)
+    dz = x[X_LOAD_WIND + 2] / load_mass - load_brake * (vz + sz)
     own = 1.0 / p.vehicle_mass
     other = 1.0 / load_mass if hanging else 0.0
     both = own + other
@@ -299,7 +316,9 @@ def _fly(f: Filter, step: float, wrench: Array, jacobian: Array) -> None:
         heavier = other * pull - wind if hanging else 0.0
         phi[row_s, LOAD_MASS] = step * heavier
         phi[row_r, LOAD_MASS] = half_square * heavier
-        phi[row_v, VELOCITY + i] = 1.0
+        phi[row_v, VELOCITY + i] = 1.0 - step * brake
+        phi[row_s, VELOCITY + i] = step * (brake - load_brake) * moving
+        phi[row_s, row_s] -= step * load_brake * moving
         phi[row_p, POSITION + i] = 1.0
         phi[row_p, VELOCITY + i] = step
 
@@ -371,40 +390,53 @@ def _stand(f: Filter, step: float) -> None:
 def _propagate(f: Filter) -> None:
     """P = Phi P Phi', exactly symmetric; and the covariance with the remembered instants."""
     phi, cov, first, second = f.transition, f.P, f.scratch[0], f.scratch[1]
-    _rows(phi, cov, first, ERROR_SIZE)
+    _rows(phi, cov, first, ERROR_SIZE, False)
     for i in range(ERROR_SIZE):
         for j in range(ERROR_SIZE):
             second[i, j] = first[j, i]
-    _rows(phi, second, first, ERROR_SIZE)
+    _rows(phi, second, first, ERROR_SIZE, True)
     for i in range(ERROR_SIZE):
         for j in range(i + 1):
-            mean = 0.5 * (first[i, j] + first[j, i])
-            cov[i, j] = mean
-            cov[j, i] = mean
+            cov[i, j] = first[i, j]
+            cov[j, i] = first[i, j]
     width = f.m.clone_width
     if width > 0:
-        _rows(phi, f.Pxz, f.wide, width)
+        _rows(phi, f.Pxz, f.wide, width, False)
         for i in range(ERROR_SIZE):
             for j in range(width):
                 f.Pxz[i, j] = f.wide[i, j]
 
 
 @kernel
-def _rows(phi: Array, source: Array, out: Array, width: int) -> None:
-    """out = Phi source, `width` columns of it, using where Phi has entries."""
+def _rows(phi: Array, source: Array, out: Array, width: int, lower: bool) -> None:
+    """out = Phi source, `width` columns of it or only those up to the diagonal, using where Phi has entries.
+
+    Four of them at a time: that is what keeps the processor's multipliers busy.
+    """
     for i in range(ERROR_SIZE):
-        start, end = ROW_STARTS[i], ROW_STARTS[i + 1]
-        if start == end:
-            for j in range(width):
-                out[i, j] = source[i, j]
-        else:
-            for j in range(width):
-                out[i, j] = 0.0
-            for index in range(start, end):
-                column = COLUMNS[index]
-                factor = phi[i, column]
-                for j in range(width):
-                    out[i, j] += factor * source[column, j]
+        index, end = ROW_STARTS[i], ROW_STARTS[i + 1]
+        to = out[i]
+        count = i + 1 if lower else width
+        if index == end:
+            one = source[i]
+            for j in range(count):
+                to[j] = one[j]
+            continue
+        for j in range(count):
+            to[j] = 0.0
+        while index + 3 < end:
+            a, b, c, d = COLUMNS[index], COLUMNS[index + 1], COLUMNS[index + 2], COLUMNS[index + 3]
+            fa, fb, fc, fd = phi[i, a], phi[i, b], phi[i, c], phi[i, d]
+            one, two, three, four = source[a], source[b], source[c], source[d]
+            for j in range(count):
+                to[j] += fa * one[j] + fb * two[j] + fc * three[j] + fd * four[j]
+            index += 4
+        while index < end:
+            a = COLUMNS[index]
+            fa, one = phi[i, a], source[a]
+            for j in range(count):
+                to[j] += fa * one[j]
+            index += 1
 
 
 @kernel
@@ -424,6 +456,7 @@ def _add_noise(f: Filter, step: float) -> None:
     # Ornstein-Uhlenbeck force: its value at the end, the velocity it gave, and both together.
     ends = variance * (1.0 - fade * fade)
     gains = variance * tau * tau * (2.0 * step / tau - 3.0 + 4.0 * fade - fade * fade)
+    gains += p.gust_density * p.gust_density * step
     joint = variance * tau * (1.0 - fade) * (1.0 - fade)
     load = p.load_force_density * p.load_force_density * step
     torque = p.torque_density * p.torque_density * step

@@ -17,6 +17,7 @@ from controller.estimator.layout import (
     GYROSCOPE,
     LOAD,
     LOAD_VELOCITY,
+    MAG_BIAS,
     MAGNETOMETER,
     POSITION,
     RATES,
@@ -25,18 +26,22 @@ from controller.estimator.layout import (
     X_BARO_OFFSET,
     X_FORCE,
     X_GYRO_BIAS,
+    X_LOAD,
     X_LOAD_VELOCITY,
+    X_MAG_BIAS,
     X_POSITION,
     X_RATES,
     X_VELOCITY,
     Array,
     Filter,
 )
-from controller.estimator.process import cable
+from controller.estimator.process import cable, drag_rate
 from controller.estimator.rotation import matrix
 from controller.estimator.update import ROW, begin, fuse, inject, predicted_variance
 from sitl_bridge.compiled import kernel
 
+HEIGHT_STD = 0.3
+"""m, of one look at the ground's height: taken at every tick, it is a soft hold and no new fact each time."""
 STALE_SAMPLES = 50
 """So many identical samples, and a magnetometer counts as stuck: a live one has noise in every sample."""
 
@@ -103,6 +108,8 @@ def accelerometer(f: Filter, measured: Any) -> None:
         m.rejected[ACCELEROMETER] += 1  # saturated: it says nothing but "much"; the model carries on
         return
     noise = p.sensor_std[ACCELEROMETER] * p.sensor_std[ACCELEROMETER]
+    if m.vehicle_mode == FLYING:
+        noise += p.gust_std * p.gust_std
     begin(f)
     worst, squares = 0.0, 0.0
     for axis in range(3):
@@ -131,8 +138,13 @@ def _accelerometer_row(f: Filter, axis: int) -> float:
     if f.m.vehicle_mode == FLYING:
         fx, fy, fz = cable(f, jacobian)
         own = 1.0 / p.vehicle_mass
-        wx, wy, wz = fx * own + x[X_FORCE], fy * own + x[X_FORCE + 1], fz * own + x[X_FORCE + 2]
+        vx, vy, vz = x[X_VELOCITY], x[X_VELOCITY + 1], x[X_VELOCITY + 2]
+        brake = drag_rate(p.vehicle_drag, p.vehicle_mass, vx, vy, vz)
+        wx = fx * own + x[X_FORCE] - brake * vx
+        wy = fy * own + x[X_FORCE + 1] - brake * vy
+        wz = fz * own + x[X_FORCE + 2] - brake * vz
         lift = f.m.thrust * own if axis == 2 else 0.0
+        row[VELOCITY], row[VELOCITY + 1], row[VELOCITY + 2] = -brake * a, -brake * b, -brake * c
         row[FORCE], row[FORCE + 1], row[FORCE + 2] = a, b, c
         for j in range(3):
             row[LOAD + j] = own * (a * jacobian[j] + b * jacobian[3 + j] + c * jacobian[6 + j])
@@ -198,13 +210,25 @@ def rest(f: Filter) -> None:
 
 
 @kernel
+def on_ground(f: Filter) -> None:
+    """Pseudo-measurement of a vehicle that stands on the ground: its height."""
+    begin(f)
+    f.vectors[ROW, POSITION + 2] = 1.0
+    fuse(f, f.p.standing_height - f.x[X_POSITION + 2], HEIGHT_STD**2)
+    inject(f)
+
+
+@kernel
 def load_at_rest(f: Filter) -> None:
-    """Pseudo-measurement of a load on the ground: its own velocity is zero."""
-    x = f.x
+    """Pseudo-measurements of a load on the ground: its own velocity is zero, and its height."""
+    p, x = f.p, f.x
     begin(f)
     for axis in range(3):
         f.vectors[ROW, VELOCITY + axis], f.vectors[ROW, LOAD_VELOCITY + axis] = 1.0, 1.0
         fuse(f, -x[X_VELOCITY + axis] - x[X_LOAD_VELOCITY + axis], 0.1**2)
+    if p.has_ground:
+        f.vectors[ROW, POSITION + 2], f.vectors[ROW, LOAD + 2] = 1.0, 1.0
+        fuse(f, p.lying_height - x[X_POSITION + 2] - x[X_LOAD + 2], HEIGHT_STD**2)
     inject(f)
 
 
@@ -226,8 +250,11 @@ def magnetometer(f: Filter, measured: Any) -> None:
         m.rejected[MAGNETOMETER] += 1
         return
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix(f.x)
-    x = r00 * measured[0] + r01 * measured[1] + r02 * measured[2]
-    y = r10 * measured[0] + r11 * measured[1] + r12 * measured[2]
+    whole = math.sqrt(measured[0] ** 2 + measured[1] ** 2 + measured[2] ** 2)
+    a = measured[0] - whole * f.x[X_MAG_BIAS]
+    b = measured[1] - whole * f.x[X_MAG_BIAS + 1]
+    x = r00 * a + r01 * b + r02 * measured[2]
+    y = r10 * a + r11 * b + r12 * measured[2]
     fx, fy, fz = p.field[0], p.field[1], p.field[2]
     level = fx * fx + fy * fy
     innovation = -math.atan2(fx * y - fy * x, fx * x + fy * y)
@@ -263,6 +290,11 @@ def _magnetometer_row(
     row[ATTITUDE] = tx * r00 + ty * r10 + r20
     row[ATTITUDE + 1] = tx * r01 + ty * r11 + r21
     row[ATTITUDE + 2] = tx * r02 + ty * r12 + r22
+    # A lasting error e of the field, horizontal, turns what is measured of the heading by -(f x e) / f_h².
+    fx, fy = f.p.field[0], f.p.field[1]
+    level = fx * fx + fy * fy
+    row[MAG_BIAS] = -(fx * r10 - fy * r00) / level
+    row[MAG_BIAS + 1] = -(fx * r11 - fy * r01) / level
 
 
 @kernel
@@ -292,7 +324,9 @@ def measured_pull(f: Filter, measured: Any, out: Array) -> float:
     a = p.vehicle_mass * (measured[0] - x[X_ACCEL_BIAS])
     b = p.vehicle_mass * (measured[1] - x[X_ACCEL_BIAS + 1])
     c = p.vehicle_mass * (measured[2] - x[X_ACCEL_BIAS + 2]) - f.m.thrust
-    out[0] = r00 * a + r01 * b + r02 * c
-    out[1] = r10 * a + r11 * b + r12 * c
-    out[2] = r20 * a + r21 * b + r22 * c
+    vx, vy, vz = x[X_VELOCITY], x[X_VELOCITY + 1], x[X_VELOCITY + 2]
+    brake = p.vehicle_mass * drag_rate(p.vehicle_drag, p.vehicle_mass, vx, vy, vz)
+    out[0] = r00 * a + r01 * b + r02 * c + brake * vx
+    out[1] = r10 * a + r11 * b + r12 * c + brake * vy
+    out[2] = r20 * a + r21 * b + r22 * c + brake * vz
     return math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])

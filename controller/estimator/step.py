@@ -8,24 +8,22 @@ from typing import Any
 import numpy as np
 
 from controller.estimator.alignment import align, start_hanging
-from controller.estimator.delayed import gps, remember, tracker
+from controller.estimator.delayed import OUTAGE, gps, remember, tracker
 from controller.estimator.layout import (
     ALIGNING,
-    ATTITUDE,
     BODY_RATES_OUT,
     CLONE_LOAD,
     CLONE_MOTION,
     EULER_OUT,
     FILTER,
     FLYING,
-    FORCE,
+    GPS_POSITION,
+    GPS_VELOCITY,
     INPUT,
-    LOAD,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_OUT,
     LOAD_RELEASED,
-    LOAD_VELOCITY,
     LOAD_VELOCITY_OUT,
     MOST_ROTORS,
     OUTPUT_SIZE,
@@ -48,13 +46,15 @@ from controller.estimator.sensors import (
     gyroscope,
     load_at_rest,
     magnetometer,
+    on_ground,
     rest,
 )
-from controller.estimator.transitions import release, watch
-from controller.estimator.update import set_part
+from controller.estimator.transitions import leave_ground, release, stand, watch
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 MOST_MISSED_TICKS = 50
+BLIND_CLONE_TICKS = 5
+"""As long as no fix has said when fixes are taken: near enough to any of them."""
 SLIP_SPEED = 0.3
 """m/s (of the velocity: m/s²), at which a slip fades at most"""
 SLIP_TIME = 1.0
@@ -104,11 +104,13 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
         predict(f)
         if m.time > m.next_clone - 0.5 * p.period:
             remember(f, CLONE_MOTION)
-            m.next_clone += p.clone_interval
+            m.next_clone += p.clone_interval if m.align_gps else BLIND_CLONE_TICKS * p.period
         if p.tracker_interval > 0.0 and m.time > m.next_load_clone - 0.5 * p.period:
             remember(f, CLONE_LOAD)
             m.next_load_clone += p.tracker_interval
     m.time = given.time
+    silence = m.time - max(m.last_used[GPS_POSITION], m.last_used[GPS_VELOCITY])
+    m.adrift = m.vehicle_mode == FLYING and silence > OUTAGE
     if given.has_imu:
         gyroscope(f, given.gyroscope)
         accelerometer(f, given.accelerometer)
@@ -123,7 +125,9 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
         tracker(f, given)
     if m.vehicle_mode == STANDING:
         rest(f)
-    elif m.load_mode == LOAD_ON_GROUND:
+        if m.grounded and p.has_ground:
+            on_ground(f)
+    if m.load_mode == LOAD_ON_GROUND:
         load_at_rest(f)
     report(f, out)
     return int(m.vehicle_mode)
@@ -152,16 +156,9 @@ def change(record: Any, vehicle_mode: int, load_mode: int) -> int:
             start_hanging(f, 0.3, 1.0)
         m.load_mode = load_mode
     if vehicle_mode == FLYING and m.vehicle_mode == STANDING:
-        # What held it is gone; forces, rates and load start anew.
-        set_part(f, FORCE, 3, f.p.force_std)
-        for part in (LOAD, LOAD_VELOCITY):
-            for i in range(part, part + 3):
-                f.P[i, i] += f.p.initial_std[i] ** 2
-        m.vehicle_mode = FLYING
+        leave_ground(f)
     elif vehicle_mode == STANDING and m.vehicle_mode == FLYING:
-        for i in range(ATTITUDE, ATTITUDE + 3):
-            f.P[i, i] += 1e-4
-        m.vehicle_mode = STANDING
+        stand(f)
     m.slack_time = 0.0
     m.pull_time = 0.0
     for axis in range(3):

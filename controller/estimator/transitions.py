@@ -1,4 +1,7 @@
-"""Changes of model: slack and taut, load on the ground, load gone. A surprise is not divergence."""
+"""Changes of model: vehicle on the ground or not, cable slack or taut, load on the ground or gone.
+
+A surprise is not divergence.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,18 @@ from typing import Any
 
 from controller.estimator.layout import (
     ACCELEROMETER,
+    ATTITUDE,
     FLYING,
+    FORCE,
     LOAD,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_RELEASED,
     LOAD_VELOCITY,
+    POSITION,
+    STANDING,
+    VELOCITY,
+    X_FORCE,
     X_LOAD,
     X_LOAD_VELOCITY,
     X_POSITION,
@@ -20,7 +29,7 @@ from controller.estimator.layout import (
     Filter,
 )
 from controller.estimator.sensors import measured_pull
-from controller.estimator.update import set_part
+from controller.estimator.update import ROW, begin, fuse, inject, set_part
 from sitl_bridge.compiled import kernel
 
 PULL_TIME = 0.04
@@ -32,13 +41,28 @@ RELEASE_TIME = 1.5
 IMPOSSIBLE_PULL = 1e3
 """Of the load's weight; a sensor that shows that, or no number, shows nothing."""
 GROUND_MARGIN = 0.5
-"""m: a slack cable with the load this low means that the load lies on the ground."""
+"""m, and three standard deviations: what is this low may be on the ground."""
+UNKNOWN_HEIGHT = 5.0
+"""m, standard deviation: whoever knows his height no better knows nothing of the ground."""
+CONTACT_TIME = 0.12
+"""s: so long something below has to carry vehicle or load, until they stand or lie on it."""
+CARRIED = 0.2
+"""Share of the vehicle's weight that has to be carried from below."""
+LIGHT, HANGING, LIFTING = 0.4, 0.8, 0.95
+"""Shares of its weight: less than LIGHT on the cable, and a load has been set down; with more than HANGING it
+hangs where it is; with LIFTING one that lay leaves the ground."""
+KNOWN = 0.2
+"""Of the cable's length: a load whose place is known better is not looked for anew."""
+STRETCH_STD = 0.02
+"""Of the cable's length: how well a pull shows how long the cable is."""
 
 
 @kernel
 def watch(f: Filter, measured: Any) -> None:
     """Compare the pull that the accelerometer shows with what the model says, and change the model."""
     p, m, x = f.p, f.m, f.x
+    if m.vehicle_mode == STANDING and m.grounded and m.thrust > p.vehicle_mass * p.gravity:
+        leave_ground(f)
     if m.vehicle_mode != FLYING:
         return
     out = f.vectors[0]
@@ -49,13 +73,18 @@ def watch(f: Filter, measured: Any) -> None:
         m.pull[axis] += blend * (out[axis] - m.pull[axis])
     pull = math.sqrt(m.pull[0] ** 2 + m.pull[1] ** 2 + m.pull[2] ** 2)
     weight = p.load_mass * p.gravity
+    if p.has_ground:
+        low = is_low(x[X_POSITION + 2], f.P[POSITION + 2, POSITION + 2], p.standing_height)
+        carried = low and m.pull[2] > CARRIED * p.vehicle_mass * p.gravity
+        m.contact_time = m.contact_time + p.period if carried else 0.0
+        if m.contact_time > CONTACT_TIME:
+            stand(f)
+            return
     if m.rejected_in_row[ACCELEROMETER] * p.period > CONFIRM_TIME:
         # The accelerometer and the model have parted: where the load is has to be found again.
         m.rejected_in_row[ACCELEROMETER] = 0
         if m.load_mode == LOAD_ON_CABLE:
             place_load(f, pull)
-    if p.two_way:
-        return
     # What smoothing leaves of noise and unmodelled force, three standard deviations.
     noise = math.sqrt(p.sensor_std[ACCELEROMETER] ** 2 + p.force_std**2)
     floor = 3.0 * p.vehicle_mass * noise * math.sqrt(blend)
@@ -64,22 +93,116 @@ def watch(f: Filter, measured: Any) -> None:
     m.slack_time = m.slack_time + p.period if slack else 0.0
     surprising = not slack and (m.load_mode == LOAD_RELEASED or m.tension <= 0.0)
     m.pull_time = m.pull_time + p.period if surprising else 0.0
+    down = -m.pull[2]
     if m.load_mode == LOAD_ON_GROUND:
-        if -m.pull[2] > 0.95 * weight:
-            m.load_mode = LOAD_ON_CABLE
-            place_load(f, pull)
-    elif m.pull_time > CONFIRM_TIME:
+        if m.pull_time > CONFIRM_TIME and down > floor:
+            take_up(f, pull)
+        if down > LIFTING * weight:
+            lift_load(f, pull)
+        return
+    if p.two_way:
+        return
+    if down > HANGING * weight:
+        for axis in range(2):
+            m.hung[axis] = x[X_POSITION + axis] + x[X_LOAD + axis]
+    set_down = p.has_ground and down < LIGHT * weight and _load_is_low(f)
+    m.lying_time = m.lying_time + p.period if set_down else 0.0
+    if m.pull_time > CONFIRM_TIME:
         m.load_mode = LOAD_ON_CABLE
         m.pull_time = 0.0
         place_load(f, pull)
-    elif m.load_mode == LOAD_ON_CABLE and slack and m.tension <= 0.0:
-        low = x[X_POSITION + 2] + x[X_LOAD + 2] < GROUND_MARGIN
-        if p.has_ground and low and m.slack_time > 0.2:
-            m.load_mode = LOAD_ON_GROUND
-            for axis in range(3):
-                x[X_LOAD_VELOCITY + axis] = -x[X_VELOCITY + axis]
-        elif m.slack_time > RELEASE_TIME:
-            release(f)
+    elif m.load_mode == LOAD_ON_CABLE and m.lying_time > CONTACT_TIME:
+        lay_load(f)
+    elif m.load_mode == LOAD_ON_CABLE and m.slack_time > RELEASE_TIME and m.tension <= 0.0:
+        release(f)
+
+
+@kernel
+def is_low(height: float, variance: float, rest: float) -> bool:
+    """Whether something may be on the ground, where it would have the height `rest`, m."""
+    if variance > UNKNOWN_HEIGHT**2:
+        return False
+    return bool(height - 3.0 * math.sqrt(max(0.0, variance)) < rest + GROUND_MARGIN)
+
+
+@kernel
+def _load_is_low(f: Filter) -> bool:
+    cov, x = f.P, f.x
+    above = POSITION + 2
+    hanging = LOAD + 2
+    variance = cov[above, above] + 2.0 * cov[above, hanging] + cov[hanging, hanging]
+    return is_low(x[X_POSITION + 2] + x[X_LOAD + 2], variance, f.p.lying_height)
+
+
+@kernel
+def lay_load(f: Filter) -> None:
+    """The load lies on the ground: it moves no more, and is where it hung last.
+
+    Since then the ground's force on it has been taken for something else, and misplaced it.
+    """
+    p, m, x = f.p, f.m, f.x
+    m.load_mode = LOAD_ON_GROUND
+    x[X_LOAD] = m.hung[0] - x[X_POSITION]
+    x[X_LOAD + 1] = m.hung[1] - x[X_POSITION + 1]
+    x[X_LOAD + 2] = p.lying_height - x[X_POSITION + 2]
+    for axis in range(3):
+        x[X_LOAD_VELOCITY + axis] = -x[X_VELOCITY + axis]
+    set_part(f, LOAD, 3, 0.1 * p.rest_length)
+    set_part(f, LOAD_VELOCITY, 3, 0.5)
+
+
+@kernel
+def take_up(f: Filter, pull: float) -> None:
+    """The cable is taut although the model says slack: it is as long as the pull shows, `pull` in N."""
+    p, x = f.p, f.x
+    length = math.sqrt(x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2) + 1e-9
+    begin(f)
+    for axis in range(3):
+        f.vectors[ROW, LOAD + axis] = x[X_LOAD + axis] / length
+    fuse(f, p.rest_length + pull / p.stiffness - length, (STRETCH_STD * p.rest_length) ** 2)
+    inject(f)
+
+
+@kernel
+def lift_load(f: Filter, pull: float) -> None:
+    """The load leaves the ground."""
+    p, m = f.p, f.m
+    m.load_mode = LOAD_ON_CABLE
+    known = (KNOWN * p.rest_length) ** 2
+    if f.P[LOAD, LOAD] > known or f.P[LOAD + 1, LOAD + 1] > known:
+        place_load(f, pull)
+        return
+    for i in range(LOAD_VELOCITY, LOAD_VELOCITY + 3):
+        f.P[i, i] += 0.2**2
+
+
+@kernel
+def leave_ground(f: Filter) -> None:
+    """What held or carried the vehicle is gone: forces, rates and load start anew."""
+    f.m.vehicle_mode = FLYING
+    f.m.grounded = False
+    f.m.contact_time = 0.0
+    set_part(f, FORCE, 3, f.p.force_std)
+    for part in (LOAD, LOAD_VELOCITY):
+        for i in range(part, part + 3):
+            f.P[i, i] += f.p.initial_std[i] ** 2
+
+
+@kernel
+def stand(f: Filter) -> None:
+    """The vehicle stands on the ground: whatever it did before, it is at rest now.
+
+    What was believed of its velocity is forgotten and not found wrong: that would move its place by metres,
+    under a law that is still at work.
+    """
+    f.m.vehicle_mode = STANDING
+    f.m.grounded = True
+    f.m.contact_time = 0.0
+    set_part(f, VELOCITY, 3, 0.1)
+    for axis in range(3):
+        f.x[X_FORCE + axis] = 0.0
+        f.x[X_VELOCITY + axis] = 0.0
+        f.P[ATTITUDE + axis, ATTITUDE + axis] += 0.01**2
 
 
 @kernel
@@ -98,6 +221,9 @@ def place_load(f: Filter, pull: float) -> None:
             x[X_LOAD + axis] *= 0.98 * p.rest_length / length
     set_part(f, LOAD, 3, 0.15 * length)
     set_part(f, LOAD_VELOCITY, 3, 1.5)
+    for axis in range(3):
+        x[X_FORCE + axis] = 0.0  # all that pulls has been taken for the cable
+    set_part(f, FORCE, 3, p.force_std)
 
 
 @kernel

@@ -36,8 +36,8 @@ class Tuning:
     """rad/s"""
     magnetometer_std: float = 0.05
     """rad, of heading"""
-    heading_bias_std: float = 0.0
-    """rad, of what a lasting error of the magnetometer turns the heading by; nothing on board shows it"""
+    magnetometer_bias_std: float = 0.0
+    """of each body axis, as a part of the whole field: the magnetometer's lasting error"""
     barometer_std: float = 0.3
     """m"""
     gps_position_std: Triple = (0.5, 0.5, 0.8)
@@ -167,7 +167,7 @@ def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> 
         accelerometer_std=std(accelerometer, 0.02),
         gyroscope_std=std(gyroscope, 1e-3),
         magnetometer_std=std(sensors.magnetometer, 0.0) / math.hypot(field[0], field[1]) + 1e-3,
-        heading_bias_std=sensors.magnetometer.bias / math.hypot(field[0], field[1]),
+        magnetometer_bias_std=sensors.magnetometer.bias / math.hypot(*field),
         barometer_std=std(barometer, 0.02),
         gps_position_std=(horizontal, horizontal, vertical),
         gps_velocity_std=(across, across, up),
@@ -207,6 +207,12 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     p["substeps"] = max(1, math.ceil(math.sqrt(stiffness / reduced) * period / STEP_ANGLE))
     p["two_way"] = cable.model == "two-way"
     p["has_ground"] = tuning.has_ground
+    if vehicle.ground is not None:
+        p["starts_on_ground"] = vehicle.initial.start == "ground"
+        p["standing_height"] = vehicle.ground.height - min(leg[2] for leg in vehicle.airframe.legs)
+        p["lying_height"] = vehicle.ground.height + vehicle.load.radius
+    p["vehicle_drag"] = (vehicle.airframe.drag.linear, vehicle.airframe.drag.quadratic)
+    p["load_drag"] = (vehicle.load.drag.linear, vehicle.load.drag.quadratic)
     p["rotor_count"] = len(vehicle.rotors)
     for index, rotor in enumerate(vehicle.rotors):
         p["rotor_x"][index], p["rotor_y"][index], _ = rotor.position
@@ -217,7 +223,7 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     p["command_delay"] = vehicle.loop.delay_ticks
     direction = np.array(tuning.field)
     p["field"] = direction / np.linalg.norm(direction)
-    start = np.array(vehicle.initial.load_position) - np.array(vehicle.initial_vehicle_position)
+    start = np.array(vehicle.initial_load_position) - np.array(vehicle.initial_vehicle_position)
     p["initial_load"] = start
     stds = np.zeros(SENSOR_COUNT)
     stds[ACCELEROMETER], stds[GYROSCOPE] = tuning.accelerometer_std, tuning.gyroscope_std
@@ -240,6 +246,10 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     return record
 
 
+USUAL_WIND = 3.0
+"""m/s, standard deviation: nobody tells the filter the wind, but that there may be one."""
+WIND_TIME = 3.0
+"""s, in which the wind's force on the vehicle changes."""
 MOST_SUBSTEPS = 4
 STEP_ANGLE = 0.3
 """rad of the cable's bounce that one step may take: second order is then right to a percent."""
@@ -255,18 +265,27 @@ GATE_NAMES = {
 
 
 def _set_disturbance(p: Any, vehicle: Vehicle, tuning: Tuning) -> None:
-    """Unmodelled forces: a held white force F of the description is, to the filter, F²·hold per hertz."""
+    """Unmodelled forces: a held white force F of the description is, to the filter, F²·hold per hertz.
+
+    On a vehicle with drag the coloured force is that of an unknown wind, which changes slowly; a white force
+    comes on top. Without drag there is no wind, and the coloured force is the white one as it is held.
+    """
     disturbance = vehicle.disturbance
     hold, force = disturbance.hold_time, disturbance.force_std
     on_vehicle = force if disturbance.acts_on != "load" else 0.0
     on_load = force if disturbance.acts_on != "vehicle" else 0.0
     calm = 0.005 * vehicle.gravity  # m/s²: no model of the thrust is better than half a percent
-    p["force_std"] = (
-        tuning.force_std
-        if tuning.force_std is not None
-        else math.hypot(on_vehicle / vehicle.airframe.mass, calm)
-    )
-    p["force_time"] = tuning.force_time if tuning.force_time is not None else 0.5 * hold
+    gust = on_vehicle / vehicle.airframe.mass
+    drag = vehicle.airframe.drag
+    windy = (drag.linear + drag.quadratic * USUAL_WIND) * USUAL_WIND / vehicle.airframe.mass
+    p["force_std"], p["force_time"] = math.hypot(gust, calm), 0.5 * hold
+    if windy > 0.0:
+        p["force_std"], p["force_time"] = math.hypot(windy, calm), WIND_TIME
+        p["gust_std"], p["gust_density"] = gust, gust * math.sqrt(hold)
+    if tuning.force_std is not None:
+        p["force_std"] = tuning.force_std
+    if tuning.force_time is not None:
+        p["force_time"] = tuning.force_time
     p["load_force_density"] = (
         tuning.load_force_density
         if tuning.load_force_density is not None
@@ -275,7 +294,7 @@ def _set_disturbance(p: Any, vehicle: Vehicle, tuning: Tuning) -> None:
 
 
 def initial_std(vehicle: Vehicle, tuning: Tuning) -> Any:
-    """Standard deviations (32,) of the error state after an alignment at rest."""
+    """Standard deviations (34,) of the error state after an alignment at rest."""
     std = np.zeros(ERROR_SIZE)
     std[PARTS["position"]] = tuning.gps_position_std
     std[PARTS["velocity"]] = tuning.gps_velocity_std
@@ -289,4 +308,5 @@ def initial_std(vehicle: Vehicle, tuning: Tuning) -> Any:
     std[PARTS["force"]] = 0.5
     std[PARTS["load_wind"]] = 0.05 * vehicle.load.mass * vehicle.gravity if tuning.estimate_load_wind else 0.0
     std[PARTS["load_mass"]] = 0.3 if tuning.estimate_load_mass else 0.0
+    std[PARTS["mag_bias"]] = tuning.magnetometer_bias_std
     return std

@@ -147,6 +147,9 @@ def _apply(f: Filter, left: float, variance: float) -> None:
 def inject(f: Filter) -> None:
     """Move the corrections into nominal state and remembered quantities."""
     x, correction = f.x, f.vectors[CORRECTION]
+    if f.m.adrift:  # the place is known to metres, and every hint at the velocity moves it by as much
+        for i in range(3):
+            f.m.slip[i] += correction[i]
     for i in range(ATTITUDE):
         x[i] += correction[i]
     turn(x, correction[ATTITUDE], correction[ATTITUDE + 1], correction[ATTITUDE + 2])

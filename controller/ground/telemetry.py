@@ -330,22 +330,28 @@ def _current_mode(machine: Machine) -> Any:
 
 
 def _estimator_status(machine: Machine, view: VehicleView) -> Any:
-    health = view.health
+    health, quality = view.health, view.quality
     flags = mavlink.ESTIMATOR_ATTITUDE * health.attitude
+    if quality.velocity if quality is not None else health.position:
+        flags |= mavlink.ESTIMATOR_VELOCITY_HORIZ | mavlink.ESTIMATOR_VELOCITY_VERT
     if health.position:
-        flags |= (
-            mavlink.ESTIMATOR_VELOCITY_HORIZ
-            | mavlink.ESTIMATOR_VELOCITY_VERT
-            | mavlink.ESTIMATOR_POS_HORIZ_ABS
-            | mavlink.ESTIMATOR_POS_VERT_ABS
+        flags |= mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_VERT_ABS
+    ratios = (0.0,) * 6
+    accuracy = (view.gps.horizontal_accuracy, view.gps.vertical_accuracy)
+    if quality is not None:
+        flags |= mavlink.ESTIMATOR_CONST_POS_MODE * quality.dead_reckoning
+        flags |= mavlink.ESTIMATOR_GPS_GLITCH * quality.gps_glitch
+        # of velocity, horizontal position, height, magnetometer; then what is not fitted
+        ratios = (
+            quality.velocity_ratio,
+            quality.position_ratio,
+            quality.height_ratio,
+            quality.heading_ratio,
+            math.nan,
+            math.nan,
         )
-    return mavlink.MAVLink_estimator_status_message(
-        _microseconds(view),
-        flags,
-        *(0.0,) * 6,
-        view.gps.horizontal_accuracy,
-        view.gps.vertical_accuracy,
-    )
+        accuracy = (quality.horizontal_accuracy, quality.vertical_accuracy)
+    return mavlink.MAVLink_estimator_status_message(_microseconds(view), flags, *ratios, *accuracy)
 
 
 BUILDERS: dict[int, Builder] = {

@@ -83,6 +83,23 @@ class Gps:
 
 
 @dataclass(slots=True)
+class EstimateQuality:
+    """What ESTIMATOR_STATUS says beyond `Health`; ratios are innovations as parts of their gates."""
+
+    velocity: bool
+    dead_reckoning: bool
+    """No GPS for a while: the horizontal position drifts"""
+    gps_glitch: bool
+    velocity_ratio: float
+    position_ratio: float
+    height_ratio: float
+    heading_ratio: float
+    horizontal_accuracy: float
+    """m, one standard deviation"""
+    vertical_accuracy: float
+
+
+@dataclass(slots=True)
 class VehicleView:
     """The vehicle as its control loop sees it now. World ENU from the origin, body FLU, SI units."""
 
@@ -113,6 +130,8 @@ class VehicleView:
     acceleration: Triple = (0.0, 0.0, 9.81)
     """m/s², specific force in the body"""
     gps: Gps = field(default_factory=Gps)
+    quality: EstimateQuality | None = None
+    """None: the feedback is the truth"""
     load_share: float = 0.0
     """share of the loop's period that its work takes, 0..1"""
 

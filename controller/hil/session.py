@@ -153,7 +153,7 @@ class HilSession:
                 self._say(
                     "disarmed" if before else f"plant and {self._feedback.name} are there: armed, flying"
                 )
-            self._feedback.flown(self._writer.controls)
+            self._feedback.flown(self._writer.controls, self._autopilot.armed)
             self.steps += 1
             if self._plain_tick is None:
                 self._plain_tick = self._bound_plain_tick()

@@ -101,7 +101,7 @@ def moved(nominal: np.ndarray, delta: np.ndarray) -> np.ndarray:
     """The nominal state plus an error."""
     out = nominal.copy()
     out[0:6] += delta[0:6]
-    out[10:33] += delta[9:32]
+    out[10:] += delta[9:]
     x, y, z = 0.5 * delta[6:9]
     w, i, j, k = nominal[6:10]
     turned = np.array(
@@ -117,11 +117,11 @@ def moved(nominal: np.ndarray, delta: np.ndarray) -> np.ndarray:
 
 
 def difference(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """a minus b as an error (32,)."""
+    """a minus b as an error (34,)."""
     w, i, j, k = b[6:10]
     conjugate = np.array([[w, i, j, k], [-i, w, k, -j], [-j, -k, w, i], [-k, j, -i, w]])
     turn = conjugate @ a[6:10]
-    return np.concatenate([a[0:6] - b[0:6], 2.0 * turn[1:] / turn[0], a[10:33] - b[10:33]])
+    return np.concatenate([a[0:6] - b[0:6], 2.0 * turn[1:] / turn[0], a[10:] - b[10:]])
 
 
 def test_health_names_every_sensor() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -55,6 +56,31 @@ def test_setpoint_on_the_estimate(fly: Fly) -> None:
     assert tuple(covariances.column_names) == COVARIANCE_COLUMNS
     assert estimates.num_rows == 40 * 250
     assert covariances.num_rows == 40 * 25
+
+
+@pytest.mark.parametrize(
+    ("rest_length", "limit"), [("1.0", (0.020, 0.020, 0.010)), ("10.0", (0.07, 0.07, 0.01))]
+)
+def test_the_estimator_beside_a_law_on_truth(
+    rest_length: str, limit: tuple[float, float, float], fly: Fly
+) -> None:
+    """Issue 6's limits, and near the linear bound; `scripts/estimator_table.py` flies 20 seeds."""
+    summary = fly(
+        "hover",
+        *("--feedback", "truth", "--sensors", "consumer", "--set", "disturbance.force_std=5"),
+        *("--set", f"cable.rest_length={rest_length}", "--duration", "60"),
+    )
+    assert summary["feedback"] == "truth"
+    figures = summary["estimate"]
+    measured, bound = np.array(figures["load_relative_rms_m"]), np.array(figures["load_relative_bound_m"])
+    assert np.all(measured <= limit)
+    assert np.all(measured <= 1.25 * bound)
+    assert np.all(measured >= 0.75 * bound)
+    assert figures["innovations_in_bounds"] == pytest.approx(0.95, abs=0.01)
+
+
+def test_truth_with_ideal_sensors_needs_no_estimator(fly: Fly) -> None:
+    assert "estimate" not in fly("hover", "--duration", "6")
 
 
 RELATIVE = (0.07, 0.07, 0.01)

@@ -1,0 +1,102 @@
+"""Under ground control on the estimate: from the ground and back, without GPS, and taken over in flight."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.estimator.layout import LOAD_ON_CABLE, LOAD_ON_GROUND
+from controller.ground.modes import Reposition
+from controller.ground.px4_modes import Mode
+from sitl_bridge.plant.sensors.instruments import LOST, WORKS
+from sitl_bridge.vehicle import load_vehicle
+from tests.estimator.guided import GuidedFlight
+
+NAN = math.nan
+
+
+def iris(seed: int = 1) -> GuidedFlight:
+    return GuidedFlight(load_vehicle("iris"), seed)
+
+
+def test_take_off_with_pick_up_a_way_and_landing() -> None:
+    flight = iris()
+    estimator = flight.feedback.estimator
+    flight.fly(lambda: not flight.machine.arming_faults(), 10.0, "ready to arm")
+    assert estimator.grounded
+    assert estimator.load_mode == LOAD_ON_GROUND
+    flight.arm_and_take_off(5.0)
+    assert estimator.load_mode == LOAD_ON_CABLE
+    vehicle, load = flight.truth()
+    assert vehicle[2] > 4.5
+    assert load[2] > 3.0
+    assert flight.machine.reposition(Reposition(False, (8.0, 5.0, NAN), NAN, NAN), True).ok
+    flight.wait(10.0)
+    vehicle, _ = flight.truth()
+    assert np.linalg.norm(vehicle[:2] - (8.0, 5.0)) < 0.5
+    assert np.abs(flight.errors()[-1]).max() < 0.5
+    assert flight.machine.set_mode(Mode.LAND, flight.now).ok
+    flight.fly(lambda: not flight.machine.armed, 60.0, "landed and disarmed")
+    assert "Landed" in flight.said
+    vehicle, load = flight.truth()
+    assert vehicle[2] < 0.15
+    assert load[2] < 0.06
+    assert np.linalg.norm(vehicle[:2] - load[:2]) > 0.3  # not on its load
+    assert flight.largest_tilt() < 0.35
+    assert estimator.grounded
+    assert estimator.load_mode == LOAD_ON_GROUND
+
+
+def test_arming_needs_gps_and_says_so() -> None:
+    flight = iris()
+    flight.fly(lambda: not flight.machine.arming_faults(), 10.0, "ready to arm")
+    flight.simulation.world.gps.doing = LOST
+    flight.wait(3.0)
+    verdict = flight.machine.arm(flight.now)
+    assert not verdict.ok
+    assert "GPS" in verdict.text
+    assert "GPS lost: position and velocity drift" in flight.said
+    flight.simulation.world.gps.doing = WORKS
+    flight.wait(1.0)
+    assert flight.machine.arm(flight.now).ok
+    assert "GPS is back" in flight.said
+
+
+def test_lands_when_the_position_is_lost() -> None:
+    flight = iris()
+    flight.arm_and_take_off(5.0)
+    flight.simulation.world.gps.doing = LOST
+    flight.fly(lambda: flight.machine.mode is Mode.LAND, 30.0, "landing")
+    assert any("Position estimate lost: landing" in text for text in flight.said)
+    # What it touches down with sideways may tip it over; then the rotors stop, which is the end as well.
+    flight.fly(lambda: not flight.machine.armed or flight.machine.terminated, 60.0, "down, rotors stopped")
+    vehicle, load = flight.truth()
+    assert vehicle[2] < 0.5
+    assert load[2] < 0.06
+
+
+def test_a_controller_that_comes_in_flight_holds_there() -> None:
+    flight = iris()
+    flight.arm_and_take_off(12.0)
+    before, _ = flight.truth()
+    flight.start_controller()
+    flight.fly(lambda: flight.machine.armed, 1.0, "taken over")
+    assert "the vehicle is in flight: aligning there" in flight.said
+    assert "Started in flight: holding" in flight.said
+    flight.wait(15.0)
+    after, _ = flight.truth()
+    assert flight.machine.flying
+    assert np.linalg.norm(after - before) < 4.0
+    assert np.abs(flight.errors()[-1]).max() < 0.6
+    assert np.linalg.norm(flight.simulation.world.state[3:6]) < 0.6
+
+
+def test_a_controller_that_comes_on_the_ground_stays_there() -> None:
+    flight = iris()
+    flight.fly(lambda: not flight.machine.arming_faults(), 10.0, "ready to arm")
+    flight.start_controller()
+    flight.wait(1.5)
+    assert not flight.machine.armed
+    assert flight.machine.arming_faults() == []
+    assert flight.feedback.estimator.grounded

@@ -1,0 +1,57 @@
+"""What a flight on the estimate survives, each a shipped scenario over the link: `iris`, 20 m up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from sitl.scenario import load_scenario, scenario_names
+
+Fly = Callable[..., dict[str, Any]]
+
+
+class Expected(NamedTuple):
+    """Of one scenario: what the load may stray, m, and the load relative to the vehicle, rms, m."""
+
+    strays: float
+    relative: float
+
+
+FAULTS = {
+    "gps-outage": Expected(5.0, 0.10),
+    "gps-jump": Expected(0.6, 0.10),
+    "compass-stuck": Expected(0.6, 0.10),
+    "baro-drift": Expected(2.0, 0.10),
+    "tracker-lost": Expected(0.6, 0.10),
+    "snatch": Expected(0.6, 0.12),
+}
+
+
+@pytest.mark.parametrize("scenario", FAULTS)
+def test_survives(scenario: str, fly: Fly) -> None:
+    """It flies to its end, and at its end holds its place as without the fault."""
+    # The barometer still drifts at the end, and takes the height along.
+    summary = fly(scenario, expect=1 if scenario == "baro-drift" else 0)
+    expected = FAULTS[scenario]
+    assert summary["completed"]
+    assert summary["feedback"] == "estimate"
+    assert summary["steady_state_error_m"] < expected.strays
+    assert max(summary["estimate"]["load_relative_rms_m"]) < expected.relative
+    log = pq.read_table(summary["state_log"])
+    assert log["vehicle_z_m"].to_numpy().min() > 18.0
+
+
+def test_the_snatch_is_beyond_the_accelerometers_range(fly: Fly) -> None:
+    """The load falls into its cable: more specific force than the sensor can show."""
+    log = pq.read_table(fly("snatch")["state_log"])
+    rise = np.diff(log["vehicle_vz_m_s"].to_numpy()) * 250.0 + 9.81
+    assert "sensors.accelerometer.range=12.0" in load_scenario("snatch").set
+    assert rise.max() > 13.0
+
+
+def test_every_fault_is_a_shipped_scenario() -> None:
+    assert set(FAULTS) <= set(scenario_names())
