@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,12 @@ from pymavlink.dialects.v20.common import MAVLINK_MSG_ID_LANDING_TARGET
 from controller.estimate_log import EstimateLog
 from controller.estimator.filter import Estimator
 from controller.estimator.tuning import Tuning, from_sensors
-from controller.feedback import PathFrom, TruthFeedback
+from controller.feedback import PathFrom, PlainTick, TruthFeedback
 from controller.health_watch import HealthWatch
+from controller.hil.answers import AnswerWriter
+from controller.hil.estimate_tick import answer_estimate
 from controller.hil.ticks import Tick, TickReader
+from controller.law import Law
 from controller.model import rotor_time_constant
 from controller.reference import Path
 from controller.state import Array
@@ -69,7 +73,6 @@ class EstimateFeedback:
 
     name = "estimate"
     needs_truth = False
-    plain = False
 
     def __init__(
         self,
@@ -123,8 +126,7 @@ class EstimateFeedback:
             self._align(in_flight=True)
         if self._first_usec is None:
             self._first_usec = time_usec
-        ticks = self._rate_hz / MICROSECONDS_PER_SECOND
-        self._tick = round((time_usec - self._first_usec) * ticks)
+        self._tick = self._tick_at(time_usec)
         if self.guessing:
             self._guess(float(reader.sensed["accelerometer"][0, 2]), time_usec)
         estimator = self.estimator
@@ -160,9 +162,35 @@ class EstimateFeedback:
             self._first_flown = self._tick
         if self.estimator.held and self._vehicle.initial.start == "hover":
             self.estimator.take_off(self._hover_speeds)
+        self._record()
+        self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
+
+    def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
+        """Datagram in, estimator, control step, answer out; between two looks at the estimate's health."""
+        arrays = (*reader.buffers, *self.estimator.arrays, *law, writer.controls, *writer.buffers)
+        answer = partial(answer_estimate.bind(*arrays), *reader.systems)
+
+        def plain_tick(length: int, last_time_usec: int, sequence: int) -> int:
+            checks = self._only_good and (self._tick + 1) % CHECK_EVERY == 0
+            released = self._flown and not self.estimator.held
+            if checks or self._lost or self.guessing or not released or self._first_usec is None:
+                return 0
+            size: int = answer(length, last_time_usec, sequence, self._first_usec, self._rate_hz)
+            if size:
+                self._tick = self._tick_at(reader.time_usec)
+                self._record()
+            return size
+
+        return plain_tick
+
+    def _tick_at(self, time_usec: int) -> int:
+        """Number of a tick, counted from the first."""
+        assert self._first_usec is not None
+        return round((time_usec - self._first_usec) * self._rate_hz / MICROSECONDS_PER_SECOND)
+
+    def _record(self) -> None:
         if self._log is not None:
             self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
-        self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
 
     def path_from(self, path_from: PathFrom) -> PathFrom:
         """From where the description has the load at the start, which no sensor shows as well.
@@ -226,8 +254,6 @@ class EstimateFeedback:
 class TruthBesideEstimate(TruthFeedback):
     """The law flies on truth; the estimator runs beside it, for its log."""
 
-    plain = False
-
     def __init__(self, beside: EstimateFeedback, rate_hz: float) -> None:
         self._beside = beside
         self._patience = round(LONGEST_WAIT * rate_hz)
@@ -242,6 +268,10 @@ class TruthBesideEstimate(TruthFeedback):
             waits = self._beside.fresh and self._patience > 0  # not where it may be in flight
             self._begun = estimate is not None or not waits
         return truth if self._begun else None
+
+    def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
+        """The estimator needs its part of every tick."""
+        return None
 
     def flown(self, controls: Array, armed: bool) -> None:
         """The estimator has to know."""

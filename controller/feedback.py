@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
+from controller.hil.answers import AnswerWriter
 from controller.hil.ticks import Tick, TickReader
+from controller.hil.truth_tick import answer_truth
+from controller.law import Law
 from controller.reference import Path
 from controller.state import Array
 from sitl_bridge.sensors import Sensors
 from sitl_bridge.vehicle import Vehicle
 
+PlainTick = Callable[[int, int, int], int]
+"""Answers a datagram that the reader holds: (its length, time_usec of the tick before, the answer's sequence
+number) to the answer's length, which the writer holds; 0: it is no plain tick, and nothing was done."""
 PathFrom = Callable[[tuple[float, float, float]], Path]
 """Makes the reference path, given where the load is (m, world) when the law takes over."""
 
@@ -26,14 +33,15 @@ class Feedback(Protocol):
     name: str
     needs_truth: bool
     """Whether the plant is to be asked for ODOMETRY."""
-    plain: bool
-    """Whether `take` does no more than to hand on the reader's estimate, and `flown` nothing."""
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick; None while there is none to fly on."""
 
     def flown(self, controls: Array, armed: bool) -> None:
         """The tick was answered with these controls (16,); disarmed, the rotors stand."""
+
+    def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
+        """The compiled tick of a law in flight; None: there is none, each is to be done in parts."""
 
     def restart(self) -> None:
         """Another plant, or the same one from its beginning."""
@@ -47,7 +55,6 @@ class TruthFeedback:
 
     name = "truth"
     needs_truth = True
-    plain = True
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The state that the plant says it is in."""
@@ -55,6 +62,11 @@ class TruthFeedback:
 
     def flown(self, controls: Array, armed: bool) -> None:
         """Truth does not need to know."""
+
+    def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
+        """Datagram in, control step, answer out."""
+        answer = answer_truth.bind(*reader.buffers, *law, writer.controls, *writer.buffers)
+        return partial(answer, *reader.systems)
 
     def restart(self) -> None:
         """Nor does it remember."""

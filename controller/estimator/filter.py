@@ -99,6 +99,9 @@ class Estimator:
         """this tick's measurements, cleared by `tick`"""
         self._output = np.zeros(OUTPUT_SIZE)
         self._rotor_speed = np.zeros(MOST_ROTORS)
+        self.arrays = (self._filter, self._record, self._output, self._rotor_speed)
+        """State, input, estimate and commanded speeds, for a compiled tick that does what `tick` and
+        `command` do."""
         self._tick = step.tick.bind(self._filter, self._record, self._output)
         self._change = step.change.bind(self._filter)
         self._command = step.command.bind(self._filter, self._rotor_speed)

@@ -11,11 +11,10 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import common
 
-from controller.feedback import Feedback, TruthFeedback
+from controller.feedback import Feedback, PlainTick, TruthFeedback
 from controller.hil.answers import AnswerWriter
 from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
-from controller.hil.truth_tick import PlainTick, answer_truth
 from controller.law import Law
 from controller.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
@@ -124,7 +123,7 @@ class HilSession:
         """Answer in one compiled call; False: there is more to this datagram, nothing was done."""
         reader, packer, length = self._reader, self._packer, len(datagram)
         reader.view[:length] = datagram
-        size = plain_tick(length, *reader.systems, self._last_time, packer.sequence)
+        size = plain_tick(length, self._last_time, packer.sequence)
         if size == 0:
             return False
         packer.next_sequence()
@@ -134,14 +133,6 @@ class HilSession:
         self._out.append(self._last_answer)
         self._last_heard = now
         return True
-
-    def _bound_plain_tick(self) -> PlainTick | None:
-        """The compiled tick, where there is no more to a tick than truth and law."""
-        law = self._autopilot.law
-        if law is None or not self._feedback.plain:
-            return None
-        reader, writer = self._reader, self._writer
-        return answer_truth.bind(*reader.buffers, *law, writer.controls, *writer.buffers)
 
     def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
         at_our_rate = self._tick_rate is None or self._tick_rate.fits(time_usec)
@@ -155,8 +146,9 @@ class HilSession:
                 )
             self._feedback.flown(self._writer.controls, self._autopilot.armed)
             self.steps += 1
-            if self._plain_tick is None:
-                self._plain_tick = self._bound_plain_tick()
+            law = self._autopilot.law
+            if self._plain_tick is None and law is not None:
+                self._plain_tick = self._feedback.plain_tick(self._reader, law, self._writer)
         else:
             self._disarm()
             if estimate is None and self._feedback.needs_truth and now >= self._next_request:

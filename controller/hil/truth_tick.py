@@ -7,7 +7,6 @@ Whatever is out of the ordinary (the first tick, a repeated one, other messages 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -70,9 +69,9 @@ def answer_truth(
     answer: Any,
     answer_payload: Bytes,
     out: Bytes,
-    length: int,
     system: int,
     load_system: int,
+    length: int,
     last_time_usec: int,
     sequence: int,
 ) -> int:
@@ -86,7 +85,3 @@ def answer_truth(
         return 0
     _control_step(designs, allocations, paths, memories, works, estimate, controls)
     return int(_write_answer(answer, answer_payload, controls, out, header[1], 1, sequence, system))
-
-
-PlainTick = Callable[[int, int, int, int, int], int]
-"""`answer_truth` with its arrays bound: takes the scalars."""

@@ -3,34 +3,50 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 
 from controller.autopilot import Autopilot
-from controller.feedback import TruthFeedback
+from controller.estimate_feedback import EstimateFeedback
+from controller.feedback import Feedback, TruthFeedback
 from controller.hil.session import new_session
 from controller.reference import setpoint
 from sitl_bridge.plant.faults import Faults, LoadFault, RotorFault, SensorFault
 from sitl_bridge.plant.lockstep import Lockstep
 from sitl_bridge.plant.notices import Notices
-from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.statelog import StateLog
 from sitl_bridge.vehicle import load_vehicle
 from tests.plant.network import Faults as Loss
 from tests.plant.network import Network
 
 RATE_HZ = 250.0
+CALM = Loss()
 
 
-class InParts(TruthFeedback):
-    """Truth, but the autopilot has to take each tick apart."""
+class InParts:
+    """A feedback whose autopilot has to take each tick apart."""
 
-    plain = False
+    def __init__(self, feedback: Feedback) -> None:
+        self._feedback = feedback
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._feedback, name)
+
+    def plain_tick(self, *arguments: Any) -> None:
+        return None
 
 
 def flight(
-    path: Path, name: str, overrides: list[str], faults: Faults, loss: Loss, whole: bool
+    path: Path,
+    name: str,
+    overrides: list[str],
+    faults: Faults = NO_FAULTS,
+    loss: Loss = CALM,
+    whole: bool = True,
+    on_estimate: bool = False,
 ) -> tuple[dict[str, list[bytes]], int]:
     """What both said in a flight of 6 s, and how many ticks the plant flew in one call."""
     vehicle = load_vehicle(name, overrides)
@@ -46,13 +62,14 @@ def flight(
         return flown
 
     simulation.exchange = exchange  # type: ignore[method-assign]
+    feedback = EstimateFeedback(vehicle, RATE_HZ) if on_estimate else TruthFeedback()
     session = new_session(
         lambda controls: Autopilot(
             vehicle, "default", RATE_HZ, lambda start: setpoint((1.0, 2.0, start[2] + 1.0), start), controls
         ),
         0,
         lambda text: None,
-        TruthFeedback() if whole else InParts(),
+        feedback if whole else InParts(feedback),
     )
     network = Network(Lockstep(simulation, Notices(lambda text: None), 0), session, loss)
     network.run(lambda: simulation.finished)
@@ -61,7 +78,7 @@ def flight(
 
 
 FLIGHTS = {
-    "paper with noise": ("paper", ["disturbance.force_std=5"], Faults()),
+    "paper with noise": ("paper", ["disturbance.force_std=5", "sensors.preset=consumer"], NO_FAULTS),
     "everything": (
         "iris",
         [
@@ -79,11 +96,16 @@ FLIGHTS = {
 }
 
 
-@pytest.mark.parametrize("name", FLIGHTS)
-def test_both_ways_say_and_log_the_same(name: str, tmp_path: Path) -> None:
+CASES = [("paper with noise", False), ("paper with noise", True), ("everything", False)]
+
+
+@pytest.mark.parametrize(("name", "on_estimate"), CASES)
+def test_both_ways_say_and_log_the_same(name: str, on_estimate: bool, tmp_path: Path) -> None:
     vehicle, overrides, faults = FLIGHTS[name]
-    whole, flown_whole = flight(tmp_path / "whole", vehicle, overrides, faults, Loss(), whole=True)
-    parts, flown_in_parts = flight(tmp_path / "parts", vehicle, overrides, faults, Loss(), whole=False)
+    whole, flown_whole = flight(tmp_path / "whole", vehicle, overrides, faults, on_estimate=on_estimate)
+    parts, flown_in_parts = flight(
+        tmp_path / "parts", vehicle, overrides, faults, whole=False, on_estimate=on_estimate
+    )
     assert flown_in_parts == 0
     assert flown_whole > 0.5 * 6.0 * RATE_HZ  # or nothing is compared here
     assert whole == parts
@@ -92,12 +114,13 @@ def test_both_ways_say_and_log_the_same(name: str, tmp_path: Path) -> None:
 
 def test_loss_and_duplicates_change_nothing_either(tmp_path: Path) -> None:
     vehicle, overrides, faults = FLIGHTS["paper with noise"]
-    flight(tmp_path / "calm", vehicle, overrides, faults, Loss(), whole=True)
-    rough = Loss(drop=0.1, duplicate=0.1, jitter_s=0.01, seed=4)
-    flight(tmp_path / "rough", vehicle, overrides, faults, rough, whole=True)
+    flight(tmp_path / "calm", vehicle, overrides, faults)
+    flight(
+        tmp_path / "rough", vehicle, overrides, faults, Loss(drop=0.1, duplicate=0.1, jitter_s=0.01, seed=4)
+    )
     assert (tmp_path / "calm").read_bytes() == (tmp_path / "rough").read_bytes()
 
 
 def test_a_loop_delay_is_flown_in_steps(tmp_path: Path) -> None:
-    _, flown_whole = flight(tmp_path / "log", "paper", ["loop.delay_ticks=2"], Faults(), Loss(), whole=True)
+    _, flown_whole = flight(tmp_path / "log", "paper", ["loop.delay_ticks=2"])
     assert flown_whole == 0
