@@ -19,7 +19,7 @@ from controller.estimator.bound import load_relative_bound
 from controller.estimator.layout import SENSORS
 from controller.estimator.tuning import CONSUMER, RTK
 from controller.estimator.weights import estimated_weights
-from sitl_bridge.vehicle import load_vehicle
+from sitl_bridge.description import load_vehicle
 from tests.estimator.flights import PERIOD, Flight, Sample, Sensors, fly
 
 CASES = (

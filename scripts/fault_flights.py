@@ -23,12 +23,12 @@ from controller.autopilot import Autopilot  # noqa: E402
 from controller.estimate_feedback import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
 from controller.reference import setpoint  # noqa: E402
+from sitl_bridge.description import load_vehicle, validated  # noqa: E402
 from sitl_bridge.plant.faults import Faults  # noqa: E402
 from sitl_bridge.plant.link_faults import FaultyPath  # noqa: E402
 from sitl_bridge.plant.notices import Notices  # noqa: E402
 from sitl_bridge.plant.realtime import Realtime  # noqa: E402
 from sitl_bridge.plant.simulation import Simulation  # noqa: E402
-from sitl_bridge.vehicle import load_vehicle, validated  # noqa: E402
 
 RATE = 250.0
 AT, END = 5.0, 20.0

@@ -21,11 +21,12 @@ from controller.reference import setpoint
 from sitl.fly import Pair, watch
 from sitl.ground_bench import ground_figures
 from sitl.roundtrip import round_trip_us
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.process import StopRequest
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 RATE_HZ = 250.0
 STEPS = 20_000

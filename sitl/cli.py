@@ -12,9 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sitl_bridge.description import DescriptionError, load_vehicle, preset_names, vehicle_names
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.process import Speaker, StopRequest
-from sitl_bridge.vehicle import DescriptionError, Vehicle, load_vehicle, preset_names, vehicle_names
+from sitl_bridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from controller.ground_link import GroundOptions, Ports

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from sitl.flight import FlightOptions
 from sitl.fly import Pair, ProgressLine, watch
 from sitl.scenario import plant_vehicle, scenario_vehicle
+from sitl_bridge.description import DescriptionError
 from sitl_bridge.process import StopRequest
-from sitl_bridge.vehicle import DescriptionError
 
 if TYPE_CHECKING:
     from controller.ground_link import GroundOptions

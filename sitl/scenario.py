@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
+from sitl_bridge.description import load_vehicle, read_toml, shipped, validated
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.schema import Section, Vector, quantity
-from sitl_bridge.vehicle import Vehicle, load_vehicle, read_toml, shipped, validated
+from sitl_bridge.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from controller.reference import Path

@@ -5,13 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sitl_bridge.vehicle import (
-    DescriptionError,
-    Vehicle,
-    hover_rotor_speed,
-    load_vehicle,
-    vehicle_names,
-)
+from sitl_bridge.description import DescriptionError, load_vehicle, vehicle_names
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
 
 
 def faults(*overrides: str, source: str = "paper") -> list[str]:

@@ -21,7 +21,8 @@ from sitl.paper.linear import damping_ratio, gains, open_loop_modes
 from sitl.paper.position import TARGET, law
 from sitl.paper.record import CORRECTED, UNSUPPORTED
 from sitl.paper.sampling import held, spectral_radius
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

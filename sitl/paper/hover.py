@@ -9,7 +9,8 @@ import numpy as np
 from sitl.paper import page, second
 from sitl.paper.context import Context
 from sitl.paper.record import CORRECTED, UNSUPPORTED
-from sitl_bridge.vehicle import Vehicle, hover_rotor_speed, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
 
 PRINTED_POINT = (2.5, 0.5)
 """z_v and z_p of the point that section IV.A linearises at, m."""

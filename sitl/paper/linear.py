@@ -15,7 +15,8 @@ from controller.model import LinearModel, linear_model, with_integrator
 from sitl.paper import page, plots, second
 from sitl.paper.context import Context
 from sitl.paper.record import CORRECTED, UNSUPPORTED
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Rational = list[list[Fraction]]

@@ -13,7 +13,8 @@ from sitl.paper.context import Context
 from sitl.paper.flights import Flight, Request
 from sitl.paper.linear import gains, hover_point
 from sitl.paper.record import CORRECTED, REPRODUCED
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from sitl.paper import offline, page, plots, second
 from sitl.paper.context import Context
 from sitl.paper.record import REPRODUCED
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

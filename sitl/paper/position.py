@@ -18,7 +18,8 @@ from sitl.paper.flights import Flight, Request
 from sitl.paper.linear import gains, hover_point
 from sitl.paper.lqr_hover import largest_difference
 from sitl.paper.record import CORRECTED, UNSUPPORTED
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,10 @@ from __future__ import annotations
 import math
 from typing import Literal, NamedTuple, Protocol
 
+from sitl_bridge.description import DescriptionError
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.schema import Section, quantity
-from sitl_bridge.vehicle import DescriptionError, Gust, Vehicle
+from sitl_bridge.vehicle import Gust, Vehicle
 
 FAILURES = {"off": OFF, "stuck": STUCK, "garbage": GARBAGE, "wrong": WRONG, "lost": LOST}
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 HOVER_SPEED = 500.0  # rad/s
 

@@ -11,12 +11,13 @@ from controller.estimate_feedback import ALIGNMENT_TIME, EstimateFeedback
 from controller.hil.session import HilSession, new_session
 from controller.hil.ticks import TickReader
 from controller.reference import setpoint
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.hil import HIL_SENSOR, SENSOR_RESET
 from sitl_bridge.plant.lockstep import Lockstep
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle
 from tests.plant.network import Faults, Network, Rows
 
 RATE_HZ = 250.0

@@ -11,7 +11,8 @@ from controller.designs import DESIGNS, design
 from controller.law import WORK, Design, engaged_memory, remember, step
 from controller.reference import Path, circle, setpoint
 from controller.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 from tests.controller.closed_loop import Flight, fly
 from tests.controller.fleet import FLEET, attributes, delayed
 

@@ -12,9 +12,10 @@ import pytest
 from controller.allocation import allocation
 from controller.model import actuated_model, linear_model, rotor_time_constant, with_rotor_lag
 from controller.state import STATE_SIZE
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant import dynamics
 from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle
 from tests.controller.coordinates import paper_state, plant_state
 from tests.controller.fleet import FLEET, attributes
 

@@ -12,7 +12,7 @@ import pytest
 from controller.designs import EVEN, Emphasis, guided_designs
 from controller.law import Design
 from controller.redesign import DesignProcess
-from sitl_bridge.vehicle import load_vehicle
+from sitl_bridge.description import load_vehicle
 
 IRIS = load_vehicle("iris", [])
 HEAVY = EVEN._replace(load_position=4.0)

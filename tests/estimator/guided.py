@@ -18,11 +18,12 @@ from controller.ground.view import profile_of
 from controller.guided import GuidedAutopilot
 from controller.hil.session import new_session
 from controller.state import Array
+from sitl_bridge.description import validated
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.plant.lockstep import Lockstep
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.vehicle import Vehicle, validated
+from sitl_bridge.vehicle import Vehicle
 
 RATE_HZ = 250.0
 COLUMNS = ("time", "truth", "estimate")

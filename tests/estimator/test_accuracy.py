@@ -9,7 +9,8 @@ import pytest
 from controller.estimator.bound import load_relative_bound
 from controller.estimator.tuning import CONSUMER, RTK
 from controller.estimator.weights import estimated_weights
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.vehicle import Vehicle
 from tests.estimator.flights import PERIOD, Flight, Sensors, fly
 
 TUNINGS = {"consumer": CONSUMER, "rtk": RTK}

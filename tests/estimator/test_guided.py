@@ -9,8 +9,8 @@ import numpy as np
 from controller.estimator.layout import LOAD_ON_CABLE, LOAD_ON_GROUND
 from controller.ground.modes import Reposition
 from controller.ground.px4_modes import Mode
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.sensors.instruments import LOST, WORKS
-from sitl_bridge.vehicle import load_vehicle
 from tests.estimator.guided import GuidedFlight
 
 NAN = math.nan

@@ -16,12 +16,13 @@ from controller.ground.view import profile_of
 from controller.guided import GuidedAutopilot
 from controller.hil.session import new_session
 from controller.law import Design
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.lockstep import Lockstep
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.state import LOAD_POSITION as PLANT_LOAD
 from sitl_bridge.plant.state import VEHICLE_POSITION as PLANT_VEHICLE
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle
 from tests.ground.rig import Client
 from tests.loopback import swing
 

@@ -13,7 +13,7 @@ import pytest
 from controller.analysis import closed_loop_matrix, delay_margin, spectral_radius
 from controller.designs import design
 from controller.model import actuated_model
-from sitl_bridge.vehicle import load_vehicle, vehicle_names
+from sitl_bridge.description import load_vehicle, vehicle_names
 
 RATE = 250.0
 STEP = 3.0  # m

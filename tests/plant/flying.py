@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.description import load_vehicle, validated
 from sitl_bridge.plant.dynamics import TABLE_ROWS, WORK_ROWS, advance
 from sitl_bridge.plant.parameters import parameters
 from sitl_bridge.plant.sensing import measure
@@ -22,7 +23,7 @@ from sitl_bridge.plant.state import (
     initial_inner_state,
     initial_state,
 )
-from sitl_bridge.vehicle import Vehicle, load_vehicle, validated
+from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 

@@ -14,9 +14,10 @@ import numpy as np
 from controller.autopilot import Autopilot
 from controller.hil.session import HilSession, new_session
 from controller.reference import setpoint
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Vehicle, load_vehicle
+from sitl_bridge.vehicle import Vehicle
 
 
 class Endpoint(Protocol):

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
+from sitl_bridge.description import DescriptionError, load_vehicle, validated
 from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.plant.faults import (
     Due,
@@ -27,7 +28,6 @@ from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WOR
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.state import CABLE_HOLDS
 from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import DescriptionError, load_vehicle, validated
 
 TABLE = {
     "sensor": [

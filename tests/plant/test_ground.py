@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sitl_bridge.description import DescriptionError, load_vehicle
 from sitl_bridge.plant.parameters import step_count
 from sitl_bridge.plant.state import (
     BODY_RATES,
@@ -18,7 +19,6 @@ from sitl_bridge.plant.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from sitl_bridge.vehicle import DescriptionError, load_vehicle
 from tests.plant.flying import energy, flight
 
 

@@ -232,7 +232,7 @@ def test_controls_that_are_not_finite_stop_their_rotors() -> None:
 
 
 def test_loop_delay_applies_each_command_that_many_ticks_later() -> None:
-    from sitl_bridge.vehicle import load_vehicle
+    from sitl_bridge.description import load_vehicle
 
     said: list[str] = []
     vehicle = load_vehicle("paper", ["loop.delay_ticks=3"])

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.battery import (
     drained,
     electric_power,
@@ -16,7 +17,7 @@ from sitl_bridge.plant.battery import (
     shaft_coefficient,
 )
 from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Battery, Vehicle, hover_rotor_speeds, load_vehicle
+from sitl_bridge.vehicle import Battery, Vehicle, hover_rotor_speeds
 from tests.plant.flying import Flight, flight
 
 BATTERY = Battery(cells=4, capacity=5.0, resistance=0.05)

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import lpmv
 
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.magnetic import EPOCH, field_at
 from sitl_bridge.plant.sensors.atmosphere import air_pressure, air_temperature
 from sitl_bridge.plant.sensors.gps import FIX_3D, NO_FIX, GpsReceiver
@@ -31,7 +32,7 @@ from sitl_bridge.plant.state import STATE_SIZE
 from sitl_bridge.plant.streams import stream
 from sitl_bridge.plant.world import World
 from sitl_bridge.sensors import Gps, Instrument, Sensors, Tracker
-from sitl_bridge.vehicle import Home, load_vehicle
+from sitl_bridge.vehicle import Home
 
 Array = NDArray[np.float64]
 RATE = 250.0

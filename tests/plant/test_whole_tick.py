@@ -13,12 +13,12 @@ from controller.estimate_feedback import EstimateFeedback
 from controller.feedback import Feedback, TruthFeedback
 from controller.hil.session import new_session
 from controller.reference import setpoint
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.faults import Faults, LoadFault, RotorFault, SensorFault
 from sitl_bridge.plant.lockstep import Lockstep
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.statelog import StateLog
-from sitl_bridge.vehicle import load_vehicle
 from tests.plant.network import Faults as Loss
 from tests.plant.network import Network
 

@@ -14,8 +14,8 @@ import pytest
 from sitl.paper import linear, second
 from sitl.paper.record import CORRECTED, REPRODUCED, UNSETTLED, UNSUPPORTED, Ledger
 from sitl.paper.run import run
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.process import StopRequest
-from sitl_bridge.vehicle import load_vehicle
 
 VERDICTS = {
     "model": CORRECTED,
