@@ -1,4 +1,4 @@
-"""Draws docs/images/drag.png: a load dragged along the ground, as flown in tests/plant/test_ground_flight.py.
+"""Draws docs/images/drag.png: a load dragged and lifted, in the flight of tests/plant/test_ground_flight.py.
 
 python scripts/drag_picture.py
 """
