@@ -1,47 +1,32 @@
 """The mode machine: requests, the vehicle's state and time in; what the law is to do out.
 
-Disarmed, or armed on the ground, the mode is only what will happen next. In the air each mode gives a
-target. Points that clients ask for are the vehicle's unless addressed to the load; what is controlled in
-flight is the load, one cable length below.
+Disarmed, or armed on the ground, the mode is only what will happen next; in the air `guidance` gives each
+mode its target. Requests are judged here, and failsafes change the mode.
 """
 
 from __future__ import annotations
 
 import math
-from enum import Enum, auto
 from typing import NamedTuple
 
 from controller.ground import plan
-from controller.ground.ascent import Ascent
-from controller.ground.descent import Descent
 from controller.ground.failsafes import Failsafes, Reaction, Situation
-from controller.ground.fence import Fence, fence_around
-from controller.ground.mission_flight import MissionFlight, Then
+from controller.ground.fence import Fence
+from controller.ground.guidance import Guidance, Stage
+from controller.ground.mission_flight import MissionFlight
 from controller.ground.parameters import Parameters
 from controller.ground.plan import Fault, Item
+from controller.ground.points import above, filled, limited_speed
 from controller.ground.preconditions import arming_faults
 from controller.ground.px4_modes import Mode
 from controller.ground.setpoints import Offboard, Setpoint
-from controller.ground.targets import Body, Follow, Goto, Idle, Target, Terminate
+from controller.ground.targets import Idle, Target, Terminate
 from controller.ground.verdict import EMERGENCY, INFO, OK, WARNING, Notice, Verdict, deny, not_now
 from controller.ground.view import Profile, VehicleView
-from controller.trajectory import stopping_distance
-from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
+from sitl_bridge.frames import Geodetic, Triple
 
-GRAVITY = 9.81
 _REACTION_MODES = {Reaction.HOLD: Mode.HOLD, Reaction.RETURN: Mode.RTL, Reaction.LAND: Mode.LAND}
 _SEVERITY_OF_MODE = {mode: reaction for reaction, mode in _REACTION_MODES.items()}
-_NEAR = 0.5
-"""m, near enough to the place above home to begin the landing"""
-
-
-class Stage(Enum):
-    """How far the vehicle is off the ground."""
-
-    GROUND = auto()
-    ASCENT = auto()
-    FLYING = auto()
-    DESCENT = auto()
 
 
 class Reposition(NamedTuple):
@@ -54,12 +39,6 @@ class Reposition(NamedTuple):
     """m/s"""
 
 
-class _Return(Enum):
-    CLIMB = auto()
-    CRUISE = auto()
-    WAIT = auto()
-
-
 class Machine:
     """The state of one vehicle that ground control can change."""
 
@@ -69,30 +48,28 @@ class Machine:
         self.armed = False
         self.terminated = False
         self.mode = Mode.HOLD
-        self.stage = Stage.GROUND
-        self.home: Triple | None = None
-        """m ENU, where the vehicle stood when it was armed last"""
         self.offboard = Offboard()
         self.mission = MissionFlight()
         self.failsafes = Failsafes()
         self.target: Target = Idle(False)
         self.notices: list[Notice] = []
         self.view: VehicleView | None = None
-        self._home_load: Triple = (0.0, 0.0, 0.0)
+        self._guidance = Guidance(profile, parameters, self.mission, self)
         self._armed_at = 0.0
-        self._ready_since = 0.0
-        self._landed = False
-        self._takeoff_height = math.nan
-        self._ascent: Ascent | None = None
-        self._descent: Descent | None = None
-        self._return = _Return.CLIMB
-        self._since = 0.0
-        self._point: Triple = (0.0, 0.0, 0.0)
-        """m, of the controlled body in HOLD and while waiting"""
-        self._yaw = 0.0
-        self._speed = math.nan
+        self._armed_at_view = 0.0
+        """The same on the plant's clock"""
 
     # What others read
+
+    @property
+    def stage(self) -> Stage:
+        """How far the vehicle is off the ground."""
+        return self._guidance.stage
+
+    @property
+    def home(self) -> Triple | None:
+        """m ENU, where the vehicle stood when it was armed last; disarmed, where it is."""
+        return self._guidance.home
 
     @property
     def flying(self) -> bool:
@@ -103,13 +80,11 @@ class Machine:
     def fence(self) -> Fence | None:
         """The limits around home, once there is one."""
         with_load = self.view is None or self.view.load_attached
-        return (
-            None if self.home is None else fence_around(self.home, self.parameters, self.profile, with_load)
-        )
+        return None if self.home is None else self._guidance.fence(with_load)
 
     def home_geodetic(self) -> Geodetic:
         """Home's latitude, longitude and altitude; the origin's until there is one."""
-        return self.profile.origin.geodetic(self.home or (0.0, 0.0, 0.0))
+        return self._guidance.home_geodetic()
 
     def arming_faults(self) -> list[str]:
         """Why the vehicle cannot be armed now."""
@@ -127,7 +102,7 @@ class Machine:
         if faults or self.view is None:
             return not_now("Arming refused: " + "; ".join(faults))
         self._begin_flight(self.view, now)
-        self._say(INFO, "Armed")
+        self.say(INFO, "Armed")
         return OK
 
     def resume(self, view: VehicleView, now: float) -> None:
@@ -135,21 +110,14 @@ class Machine:
         self.view = view
         self._begin_flight(view, now)
         if self.profile.has_ground:
-            # Where it was armed is not known; the ground is where the world's origin is.
-            self.home = self._home_load = (view.position[0], view.position[1], 0.0)
-        self._say(WARNING, "Started in flight: holding")
+            self._guidance.set_home_below(view)  # where it was armed is not known
+        self.say(WARNING, "Started in flight: holding")
 
     def _begin_flight(self, view: VehicleView, now: float) -> None:
         self.armed = True
-        self._armed_at = now
-        self._ready_since = view.time
-        self._landed = False
+        self._armed_at, self._armed_at_view = now, view.time
         self.failsafes.reset()
-        self._set_home(view)
-        airborne = not view.vehicle_on_ground
-        self.stage = Stage.FLYING if airborne else Stage.GROUND
-        if airborne:
-            self._hold_here(view)
+        self._guidance.begin(view)
 
     def disarm(self, force: bool) -> Verdict:
         """Disarm: on the ground, or anywhere by force."""
@@ -181,7 +149,7 @@ class Machine:
             return deny("Landing refused: this vehicle has no ground under it; use Hold")
         if mode is Mode.TAKEOFF:
             return self.takeoff(math.nan)
-        self._enter(mode)
+        self.enter(mode)
         return OK
 
     def takeoff(self, altitude: float) -> Verdict:
@@ -198,13 +166,13 @@ class Machine:
         if not math.isnan(altitude) and altitude <= fence.home[2]:
             above = altitude - fence.home[2]
             return deny(f"Take-off refused: {above:.1f} m above home; altitude is above mean sea level")
-        height = self._height_of_takeoff(altitude)
+        height = self._guidance.height_of_takeoff(altitude, self.view)
         fault = fence.outside((fence.home[0], fence.home[1], height))
         if fault:
             return deny(f"Take-off refused: {fault}")
-        self._takeoff_height = altitude
+        self._guidance.takeoff_height = altitude
         if self.stage is not Stage.ASCENT:
-            self._enter(Mode.TAKEOFF)
+            self.enter(Mode.TAKEOFF)
         return OK
 
     def reposition(self, where: Reposition, change_mode: bool) -> Verdict:
@@ -214,7 +182,7 @@ class Machine:
             return not_now("Going there refused: not flying; take off first")
         if self.stage is Stage.ASCENT:
             return not_now("Going there refused: still taking off; wait until that is done (IN_AIR)")
-        if self.stage is Stage.DESCENT and self._descent is not None and not self._descent.hangs:
+        if self._guidance.load_is_down:
             return not_now("Going there refused: the load is on the ground; take off again first")
         if not change_mode and self.mode is not Mode.HOLD:
             return not_now(
@@ -222,20 +190,15 @@ class Machine:
             )
         if any(math.isinf(x) for x in (*where.position, where.yaw)):
             return deny("Going there refused: position or heading is infinite")
-        body = view.load_position if where.of_load else view.position
-        new = tuple(old if math.isnan(x) else x for x, old in zip(where.position, body, strict=True))
-        point: Triple = (new[0], new[1], new[2])
-        vehicle = self._vehicle_point(point, where.of_load)
+        here = view.load_position if where.of_load else view.position
+        vehicle = self._vehicle_point(filled(where.position, here), where.of_load)
         stays = all(math.isnan(x) for x in where.position)
         fault = "" if stays or self.fence is None else self.fence.refuses(vehicle)
         if fault:
             return deny(f"Going there refused: {fault}")
-        speed = self._horizontal_limit(where.speed)
-        self._enter(Mode.HOLD)
-        if not stays:
-            self._point = self._controlled(vehicle)
-        self._yaw = self._yaw if math.isnan(where.yaw) else where.yaw
-        self._speed = speed
+        speed = limited_speed(where.speed, self.parameters)
+        self.enter(Mode.HOLD)
+        self._guidance.go_to(None if stays else vehicle, where.yaw, speed, view)
         return OK
 
     def change_speed(self, speed: float) -> Verdict:
@@ -245,8 +208,7 @@ class Machine:
             return deny(
                 f"Speed {speed:g} m/s refused: use up to {largest:g} (MPC_XY_VEL_MAX), or -1 for the default"
             )
-        self._speed = math.nan if speed == -1 else speed
-        self.mission.speed = self._speed
+        self._guidance.speed = self.mission.speed = math.nan if speed == -1 else speed
         return OK
 
     def offer(self, setpoint: Setpoint, sender: object, now: float) -> str:
@@ -255,8 +217,7 @@ class Machine:
         if fence is None or self.view is None:
             return "Set-point refused: no position yet; start the plant"
         here = self.view.load_position if setpoint.of_load else self.view.position
-        new = tuple(old if math.isnan(x) else x for x, old in zip(setpoint.position, here, strict=True))
-        point = self._vehicle_point((new[0], new[1], new[2]), setpoint.of_load)
+        point = self._vehicle_point(filled(setpoint.position, here), setpoint.of_load)
         asked = any(not math.isnan(x) for x in setpoint.position)
         low = not math.isnan(setpoint.position[2])
         fault = (fence.outside(point) if asked else "") or (fence.too_low(point) if low else "")
@@ -266,9 +227,7 @@ class Machine:
 
     def check_plan(self, items: tuple[Item, ...]) -> Fault | None:
         """The first fault of a plan."""
-        home = self.home or (0.0, 0.0, 0.0)
-        fence = fence_around(home, self.parameters, self.profile)
-        return plan.check(items, self.profile, self.home_geodetic(), fence)
+        return plan.check(items, self.profile, self.home_geodetic(), self._guidance.fence())
 
     def accept_plan(self, items: tuple[Item, ...]) -> Fault | None:
         """Take a plan, or say why not."""
@@ -291,7 +250,7 @@ class Machine:
         self.view = view
         if not self.armed:
             if view.health.position and view.in_reach and view.hil_age < math.inf:
-                self._set_home(view)
+                self._guidance.set_home(view)
             target: Target = Idle(False)
         else:
             self._react(view, now, last_station)
@@ -307,14 +266,14 @@ class Machine:
         situation = Situation(
             self.mode is Mode.OFFBOARD, self._setpoint_fresh(now), last_station, self._armed_at
         )
-        fence = fence_around(self.home, self.parameters, self.profile, view.load_attached)
+        fence = self._guidance.fence(view.load_attached)
         for trigger in self.failsafes.check(view, now, situation, self.parameters, fence):
-            self._say(trigger.severity, trigger.text)
+            self.say(trigger.severity, trigger.text)
             if trigger.reaction is Reaction.TERMINATE:
                 self._terminate("")
             elif trigger.reaction > _SEVERITY_OF_MODE.get(self.mode, Reaction.NONE):
                 ground = self.profile.has_ground or trigger.reaction is not Reaction.LAND
-                self._enter(_REACTION_MODES[trigger.reaction] if ground else Mode.HOLD)
+                self.enter(_REACTION_MODES[trigger.reaction] if ground else Mode.HOLD)
 
     def _step(self, view: VehicleView, now: float) -> Target:
         if self.terminated:
@@ -325,291 +284,63 @@ class Machine:
             return Idle(False)
         if self.stage is Stage.GROUND:
             return Idle(True)
-        if self.stage is Stage.ASCENT and self._ascent is not None:
-            target = self._ascent.target(view)
-            self._after_ascent(self._ascent, view)
-            return target
-        if self.stage is Stage.DESCENT and self._descent is not None:
-            return self._descend(self._descent, view)
-        return self._fly(view, now)
+        return self._guidance.target(view, self.offboard.latest, self.target)
 
     def _on_ground(self, view: VehicleView, now: float) -> None:
         if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (
             self.mode is Mode.OFFBOARD and self._setpoint_fresh(now)
         ):
-            self._ascend(view)
+            self._guidance.take_off(view)
             return
-        name = "COM_DISARM_LAND" if self._landed else "COM_DISARM_PRFLT"
+        landed = self._guidance.landed_at >= self._armed_at_view
+        name = "COM_DISARM_LAND" if landed else "COM_DISARM_PRFLT"
+        since = self._guidance.landed_at if landed else self._armed_at_view
         limit = self.parameters[name]
-        if 0 <= limit < view.time - self._ready_since:
-            reason = "landed" if self._landed else f"no take-off within {limit:g} s ({name})"
+        if 0 <= limit < view.time - since:
+            reason = "landed" if landed else f"no take-off within {limit:g} s ({name})"
             self._disarm(f"Disarmed: {reason}")
 
-    def _ascend(self, view: VehicleView) -> None:
-        altitude = self._takeoff_height
-        if self.mode is Mode.MISSION:
-            first = next((item for item in self.mission.items if item.command in plan.WITH_POSITION), None)
-            if first is not None and first.command == plan.TAKEOFF:
-                altitude = plan.place(first, self.profile, self.home_geodetic())[2]
-        height = self._height_of_takeoff(altitude)
-        asked = self._asked_height(altitude)
-        if height > asked + 0.01 and self.home is not None:
-            self._say(
-                INFO, f"Taking off to {height - self.home[2]:.1f} m, so that the load leaves the ground"
-            )
-        self._ascent = Ascent(height, self.parameters["MPC_TKO_SPEED"], self.profile, view)
-        self._yaw = euler_from_quaternion(view.attitude)[2]
-        self.stage = Stage.ASCENT
+    # The mode
 
-    def _after_ascent(self, ascent: Ascent, view: VehicleView) -> None:
-        done = ascent.step.name == "DONE"
-        if self.mode is Mode.LAND:
-            self._land(view, view.load_position)
-        elif done or (
-            ascent.carries and not view.load_on_ground and self.mode is not Mode.TAKEOFF and self._clear(view)
-        ):
-            self.stage = Stage.FLYING
-            self._ascent = None
-            self._point = ascent.target(view).position if done else self._stopping_point(view)
-            if self.mode is Mode.TAKEOFF:
-                self._set_mode(Mode.HOLD)
-            self._start(self.mode)
-
-    def _clear(self, view: VehicleView) -> bool:
-        fence = self.fence
-        return fence is None or view.position[2] >= fence.home[2] + fence.least_height
-
-    def _descend(self, descent: Descent, view: VehicleView) -> Target:
-        if self.mode not in (Mode.LAND, Mode.RTL):
-            if descent.hangs:
-                self.stage = Stage.FLYING
-                self._hold_here(view)
-                self._start(self.mode)
-                return self._hold_target()
-            self._ascend(view)
-            return self.target
-        target = descent.target(view)
-        if descent.step.name == "DONE":
-            self.stage = Stage.GROUND
-            self._landed = True
-            self._ready_since = view.time
-            self._set_mode(Mode.HOLD)
-            self._say(INFO, "Landed")
-            return Idle(True)
-        return target
-
-    def _fly(self, view: VehicleView, now: float) -> Target:
-        if self.mode is Mode.LAND:
-            self._land(view, self._stopping_point(view))
-            return self._descend(self._descent, view) if self._descent else self._hold_target()
-        if self.mode is Mode.RTL:
-            return self._return_home(view)
-        if self.mode is Mode.MISSION:
-            return self._fly_mission(view)
-        if self.mode is Mode.OFFBOARD and self.offboard.latest is not None:
-            return self._follow(self.offboard.latest, view)
-        return self._hold_target()
-
-    # Modes in flight
-
-    def _enter(self, mode: Mode) -> None:
+    def enter(self, mode: Mode) -> None:
         """Change the mode; in flight it begins now."""
         if self.mode is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.pause()
         again = mode is self.mode and mode not in (Mode.HOLD, Mode.RTL)
-        self._set_mode(mode)
+        self.set_mode_to(mode)
         if self.view is not None and self.armed and self.stage is Stage.FLYING and not again:
-            self._hold_here(self.view)
-            self._start(mode)
+            self._guidance.hold_here(self.view)
+            self._guidance.start(mode)
 
-    def _start(self, mode: Mode) -> None:
-        """Begin a mode in flight, from where the vehicle holds."""
-        self._speed = math.nan
-        self._return = _Return.CLIMB
-        if mode is Mode.MISSION:
-            self.mission.start()
-
-    def _hold_here(self, view: VehicleView) -> None:
-        self._point = self._stopping_point(view)
-        self._yaw = euler_from_quaternion(view.attitude)[2]
-        self._speed = math.nan
-
-    def _stopping_point(self, view: VehicleView) -> Triple:
-        """Where the controlled body comes to rest if it brakes now, m."""
-        position, velocity = (
-            (view.load_position, view.load_velocity) if view.load_attached else (view.position, view.velocity)
-        )
-        speed = math.hypot(*velocity)
-        if speed == 0.0:
-            return position
-        share = stopping_distance(speed, self.parameters["MPC_ACC_HOR"]) / speed
-        x, y, z = (p + v * share for p, v in zip(position, velocity, strict=True))
-        return (x, y, z)
-
-    def _hold_target(self) -> Goto:
-        return Goto(self._body(), self._point, self._yaw, self._horizontal_limit(self._speed))
-
-    def _return_home(self, view: VehicleView) -> Target:
-        home = self.home or (0.0, 0.0, 0.0)
-        hanging = self.profile.hover_length if view.load_attached else 0.0
-        over = self._home_load if view.load_attached else home
-        here = view.load_position if view.load_attached else view.position
-        if self._return is _Return.CLIMB:
-            near = math.hypot(here[0] - over[0], here[1] - over[1]) < self.parameters["RTL_MIN_DIST"]
-            height = here[2] if near else max(here[2], home[2] + self.parameters["RTL_RETURN_ALT"] - hanging)
-            start = (self._point[0], self._point[1])
-            self._point = (*(over[:2] if near else start), height)
-            if near or abs(here[2] - height) < _NEAR:
-                self._return = _Return.CRUISE
-                self._point = (over[0], over[1], height)
-        elif self._return is _Return.CRUISE:
-            if math.dist(here, self._point) < _NEAR:
-                self._return = _Return.WAIT
-                self._since = view.time
-        else:
-            delay = self.parameters["RTL_LAND_DELAY"]
-            if 0 <= delay <= view.time - self._since and self.profile.has_ground:
-                self._land(view, over, home)
-        return self._hold_target()
-
-    def _land(self, view: VehicleView, place: Triple, stand: Triple | None = None) -> None:
-        p = self.parameters
-        ground = (self.home or (0.0, 0.0, 0.0))[2]
-        self._ascent = None
-        self._descent = Descent(
-            place,
-            ground,
-            p["MPC_LAND_SPEED"],
-            p["MPC_Z_VEL_MAX_DN"],
-            p["LND_BESIDE"],
-            self.profile,
-            view,
-            stand,
-        )
-        self.stage = Stage.DESCENT
-
-    def _fly_mission(self, view: VehicleView) -> Target:
-        hanging = self.profile.hover_length if view.load_attached else 0.0
-        home = self.home_geodetic()
-        step = self.mission.advance(
-            view, lambda item: plan.place(item, self.profile, home), hanging, self.parameters["NAV_ACC_RAD"]
-        )
-        if isinstance(step, Then):
-            self._after_mission(step, view)
-            return self._hold_target()
-        self._speed = self.mission.speed
-        if step.point is not None:
-            self._point = self._controlled(step.point)
-        self._yaw = self._yaw if math.isnan(step.yaw) else step.yaw
-        return self._hold_target()
-
-    def _after_mission(self, then: Then, view: VehicleView) -> None:
-        point, yaw = self._point, self._yaw
-        if then is Then.RETURN:
-            self._enter(Mode.RTL)
-            return
-        if then is Then.LAND:
-            self._set_mode(Mode.LAND)
-            self._land(view, self._point)
-            return
-        if then is Then.LOST:
-            self._say(WARNING, "Mission stopped: its jumps go in circles; holding")
-            self.mission.pause()
-        elif then is Then.PAUSE:
-            self._say(INFO, "Mission waits (autocontinue 0); start it again to go on")
-        else:
-            self._say(INFO, "Mission finished; holding")
-        self._set_mode(Mode.HOLD)
-        self._point, self._yaw, self._speed = point, yaw, math.nan
-
-    def _follow(self, asked: Setpoint, view: VehicleView) -> Target:
-        attached = view.load_attached
-        position, velocity = asked.position, self._limited(asked.velocity)
-        if attached and not asked.of_load:
-            x, y, z = (p - d for p, d in zip(position, self._hanging(asked.acceleration), strict=True))
-            position = (x, y, z)
-        plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
-        self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
-        if plain:
-            self._point = position
-            return Goto(self._body(), position, self._yaw, self.parameters["MPC_XY_VEL_MAX"])
-        return Follow(self._body(), position, velocity, asked.acceleration, asked.yaw, asked.yaw_rate)
-
-    # Small conversions
-
-    def _hanging(self, acceleration: Triple) -> Triple:
-        """From the load to the vehicle for a steady acceleration (NaN: none), m."""
-        pull = [0.0 if math.isnan(a) else a for a in acceleration]
-        pull[2] += GRAVITY
-        size = math.hypot(*pull)
-        if size < 1e-3:
-            return (0.0, 0.0, self.profile.hover_length)
-        scale = self.profile.hover_length / size
-        return (pull[0] * scale, pull[1] * scale, pull[2] * scale)
-
-    def _limited(self, velocity: Triple) -> Triple:
-        p = self.parameters
-        flat = math.hypot(*(0.0 if math.isnan(v) else v for v in velocity[:2]))
-        scale = min(1.0, p["MPC_XY_VEL_MAX"] / flat) if flat > 0 else 1.0
-        z = velocity[2]
-        up = z if math.isnan(z) else max(-p["MPC_Z_VEL_MAX_DN"], min(p["MPC_Z_VEL_MAX_UP"], z))
-        return (velocity[0] * scale, velocity[1] * scale, up)
-
-    def _horizontal_limit(self, speed: float) -> float:
-        asked = speed if speed > 0 else self.parameters["MPC_XY_CRUISE"]
-        return min(asked, self.parameters["MPC_XY_VEL_MAX"])
-
-    def _body(self) -> Body:
-        return Body.LOAD if self.view is None or self.view.load_attached else Body.VEHICLE
+    def set_mode_to(self, mode: Mode) -> None:
+        """Have another mode, and say so."""
+        if mode is not self.mode:
+            self.mode = mode
+            self.say(INFO, f"Mode: {mode.title}")
 
     def _vehicle_point(self, point: Triple, of_load: bool) -> Triple:
-        return (point[0], point[1], point[2] + self.profile.hover_length) if of_load else point
-
-    def _controlled(self, vehicle: Triple) -> Triple:
-        """The controlled body's point for a vehicle's point."""
-        if self._body() is Body.VEHICLE:
-            return vehicle
-        return (vehicle[0], vehicle[1], vehicle[2] - self.profile.hover_length)
-
-    def _asked_height(self, altitude: float) -> float:
-        home = self.home or (0.0, 0.0, 0.0)
-        return home[2] + self.parameters["MIS_TAKEOFF_ALT"] if math.isnan(altitude) else altitude
-
-    def _height_of_takeoff(self, altitude: float) -> float:
-        home = self.home or (0.0, 0.0, 0.0)
-        least = self.fence.least_height if self.fence is not None else 0.0
-        return max(self._asked_height(altitude), home[2] + least)
+        return above(point, self.profile.hover_length) if of_load else point
 
     def _setpoint_fresh(self, now: float) -> bool:
         return self.offboard.fresh(now, self.parameters["COM_OF_LOSS_T"])
 
-    def _set_home(self, view: VehicleView) -> None:
-        self.home = view.position
-        self._home_load = view.load_position
-
-    def _set_mode(self, mode: Mode) -> None:
-        if mode is not self.mode:
-            self.mode = mode
-            self._say(INFO, f"Mode: {mode.title}")
-
     def _disarm(self, text: str) -> None:
         self.armed = False
-        self.stage = Stage.GROUND
-        self._ascent = self._descent = None
-        self._takeoff_height = math.nan
+        self._guidance.end()
         self.mission.pause()
         self.failsafes.reset()
         self.mode = Mode.HOLD
-        self._say(INFO, text)
+        self.say(INFO, text)
 
     def _terminate(self, text: str) -> None:
         self.terminated = True
         self.mode = Mode.TERMINATION
         self.mission.pause()
         if text:
-            self._say(EMERGENCY, text)
+            self.say(EMERGENCY, text)
 
-    def _say(self, severity: int, text: str) -> None:
+    def say(self, severity: int, text: str) -> None:
+        """A STATUSTEXT to everybody."""
         self.notices.append(Notice(severity, text))
 
 

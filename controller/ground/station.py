@@ -12,10 +12,11 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground import telemetry
 from controller.ground.command_service import CommandService
+from controller.ground.guidance import Stage
 from controller.ground.inbox import Inbox
 from controller.ground.load_relay import LoadRelay
 from controller.ground.missions import Missions
-from controller.ground.modes import Machine, Stage
+from controller.ground.modes import Machine
 from controller.ground.outbox import Outbox
 from controller.ground.parameter_file import ParameterFile
 from controller.ground.parameters import Parameters

@@ -8,8 +8,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.guidance import Stage
 from controller.ground.heartbeat import heartbeat
-from controller.ground.modes import Machine, Stage
+from controller.ground.modes import Machine
 from controller.ground.px4_modes import SELECTABLE
 from controller.ground.setpoints import NOTHING
 from controller.ground.targets import Body, Follow, Goto, Land

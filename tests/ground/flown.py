@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.designs import Emphasis, guided_designs
-from controller.ground.modes import Stage
+from controller.ground.guidance import Stage
 from controller.ground.peers import Address
 from controller.ground.station import Station
 from controller.ground.view import profile_of
