@@ -116,14 +116,14 @@ class UdpLink:
 
     def receive(self, until: float) -> bytes | None:
         """The next datagram, or None when `time.monotonic()` reaches `until` first."""
-        wait = until - time.monotonic()
+        wait = min(until - time.monotonic(), LONGEST_WAIT)
         flags = 0
         if self._punctual or wait <= 0.0:
             flags = int(socket.MSG_DONTWAIT)
-            if wait > 0.0 and not select.select([self._socket], [], [], min(wait, LONGEST_WAIT))[0]:
+            if wait > 0.0 and not select.select([self._socket], [], [], wait)[0]:
                 return None
         elif not self._timeout - COARSE_WAIT < wait <= self._timeout:
-            self._set_timeout(min(wait, LONGEST_WAIT))
+            self._set_timeout(wait)
         try:
             if self._fixed:
                 return self._socket.recv(LARGEST_DATAGRAM, flags)
