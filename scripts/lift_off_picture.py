@@ -44,8 +44,9 @@ async def command(connection: str) -> None:
         await action.set_takeoff_altitude(HEIGHT)
         await action.arm()
         await action.takeoff()
-        while (await telemetry.flight_mode()).name != "HOLD":
-            await asyncio.sleep(0.2)
+        for mode in ("TAKEOFF", "HOLD"):  # it stood in HOLD
+            while (await telemetry.flight_mode()).name != mode:
+                await asyncio.sleep(0.1)
         await asyncio.sleep(HOVER)
         await action.land()
         while await telemetry.armed():
