@@ -143,6 +143,7 @@ def bench(repeats: int) -> dict[str, float]:
     vehicle = load_vehicle("paper", ["cable.rest_length=10"])
     consumer = load_vehicle("paper", ["cable.rest_length=10", "sensors.preset=consumer"])
     full = load_vehicle("iris", FULL)
+    standing = load_vehicle("iris", [*FULL, "initial.start=ground"])
     full_options = ["--vehicle", "iris", *(word for change in FULL for word in ("--set", change))]
     sizes = datagram_sizes(vehicle)
     samples: dict[str, list[float]] = {}
@@ -160,6 +161,7 @@ def bench(repeats: int) -> dict[str, float]:
         }
         full_factor = lockstep_flight("hover", *full_options)["real_time_factor"]
         measured["physics_step_us_full"] = physics_step_us(full)
+        measured["physics_step_us_ground_full"] = physics_step_us(standing)
         measured["lockstep_tick_us_full"] = 1e6 / (full_factor * RATE_HZ)
         measured["physics_step_full_ratio"] = measured["physics_step_us_full"] / measured["physics_step_us"]
         measured["lockstep_tick_full_ratio"] = (
