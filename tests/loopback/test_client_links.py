@@ -224,6 +224,10 @@ def test_what_px4_gets_wrong_over_the_wire(tmp_path: Path) -> None:
         client.close()
 
 
+SCENARIO = ("--scenario", "hold", "--sensors", "rtk")
+"""With a receiver that knows the height again after a restart, where a consumer's is metres off."""
+
+
 class ByHand:
     """Plant and controller, each on its own."""
 
@@ -231,14 +235,14 @@ class ByHand:
         self.hil, self.gcs, self.gcs_peer, self.onboard, self.onboard_peer = free_ports(5)
         self._start = start
         plant = ("--hil", f"udpout:127.0.0.1:{self.hil}", "--clock", "lockstep", "--speed", "1")
-        self.plant = start("plant", "--scenario", "hold", *plant)
+        self.plant = start("plant", *SCENARIO, *plant)
         self.controller = self.start_controller()
 
     def start_controller(self) -> Process:
         """Start it, once more if it was there before."""
         links = ("--gcs", f"{self.gcs}:{self.gcs_peer}", "--onboard", f"{self.onboard}:{self.onboard_peer}")
         hil = ("--hil", f"udpin:127.0.0.1:{self.hil}")
-        self.controller = self._start("controller", "--scenario", "hold", *hil, *links)
+        self.controller = self._start("controller", *SCENARIO, *hil, *links)
         self.controller.wait_for("plant connected")
         return self.controller
 
