@@ -1,12 +1,11 @@
-"""Evaluate the estimator offline over seeds, and draw the figures of docs/estimator.md.
+"""Draw the figures of docs/estimator.md, from flights in one process (its table: `estimator_table.py`).
 
-PYTHONPATH=. python scripts/estimator_figures.py --seeds 20 --duration 120 --out docs/figures
+python scripts/estimator_figures.py --out docs/figures
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,62 +14,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from controller.estimator.bound import load_relative_bound
-from controller.estimator.layout import SENSORS
-from controller.estimator.tuning import CONSUMER, RTK
 from controller.estimator.weights import estimated_weights
 from sitl_bridge.description import load_vehicle
-from tests.estimator.flights import PERIOD, Flight, Sample, Sensors, fly
-
-CASES = (
-    (1.0, "consumer", True),
-    (10.0, "consumer", True),
-    (1.0, "consumer", False),
-    (10.0, "consumer", False),
-    (1.0, "rtk", False),
-    (10.0, "rtk", False),
-)
-TUNINGS = {"consumer": CONSUMER, "rtk": RTK}
-INDEPENDENT_TIME = 10.0
-"""s after which errors are taken as independent, for the bounds of NEES."""
-
-
-def evaluate(rest_length: float, sensors: str, on_truth: bool, seeds: int, duration: float) -> dict[str, Any]:
-    """One row of the table: root mean squares over the seeds, the worst seed, consistency."""
-    overrides = ["disturbance.force_std=5", f"cable.rest_length={rest_length}"]
-    vehicle, tuning = load_vehicle("paper", overrides), TUNINGS[sensors]
-    relative, absolute, nees, innovations, within = [], [], [], [], []
-    for seed in range(seeds):
-        flight = fly(
-            vehicle,
-            estimated_weights(vehicle),
-            duration,
-            seed,
-            sensors=Sensors(tuning=tuning),
-            on_truth=on_truth,
-        )
-        relative.append(flight.load_relative_error())
-        absolute.append(flight.load_error(np.array(vehicle.initial.load_position)))
-        nees.append(flight.nees[500:-1])
-        m = flight.estimator.memory
-        innovations.append(m["nis_sum"][:6] / m["nis_count"][:6])
-        within.append(m["within"][:6] / m["seen"][:6])
-    return {
-        "rest_length_m": rest_length,
-        "sensors": sensors,
-        "feedback": "truth" if on_truth else "estimate",
-        "load_relative_rms_m": np.sqrt(np.mean(np.square(relative), axis=0)).round(5).tolist(),
-        "load_relative_worst_m": np.max(relative, axis=0).round(5).tolist(),
-        "load_relative_bound_m": load_relative_bound(vehicle, PERIOD, tuning).round(5).tolist(),
-        "load_rms_m": np.sqrt(np.mean(np.square(absolute), axis=0)).round(5).tolist(),
-        "load_worst_m": np.max(absolute, axis=0).round(5).tolist(),
-        "nees_mean": round(float(np.mean(nees)), 4),
-        "nees_bound": round(
-            float(1.96 * np.sqrt(2.0 / (15 * seeds * (duration - 20) / INDEPENDENT_TIME))), 4
-        ),
-        "innovations_in_bounds": dict(zip(SENSORS, np.mean(within, axis=0).round(4).tolist(), strict=False)),
-        "nis": dict(zip(SENSORS, np.mean(innovations, axis=0).round(4).tolist(), strict=False)),
-    }
+from tests.estimator.flights import Flight, Sample, fly
 
 
 def estimate_figure(flight: Flight, path: Path) -> None:
@@ -161,16 +107,10 @@ def draw(out: Path) -> None:
 
 
 def main() -> None:
+    """Draw."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--duration", type=float, default=120.0)
     parser.add_argument("--out", type=Path, default=Path("docs/figures"))
-    parser.add_argument("--no-table", action="store_true", help="only the figures")
-    arguments = parser.parse_args()
-    if not arguments.no_table:
-        for case in CASES:
-            print(json.dumps(evaluate(*case, arguments.seeds, arguments.duration)), flush=True)
-    draw(arguments.out)
+    draw(parser.parse_args().out)
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ def summary_of(case: Case, seed: int, duration: float, out: Path) -> dict[str, A
     """Fly one flight, unless it has been flown; its summary."""
     folder = out / f"{case.feedback}-{case.sensors}-{case.rest_length:g}-{seed}-{duration:g}"
     summary = folder / "summary.json"
-    if not summary.exists():
+    if not summary.exists() or not json.loads(summary.read_text())["completed"]:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]

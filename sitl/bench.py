@@ -86,7 +86,7 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
 
 
 def estimator_update_us(vehicle: Vehicle) -> float:
-    """Time of one tick of the estimator, us: inertial sensors, magnetometer, barometer; GPS at its rate."""
+    """Median time of the estimator's tick, us: inertial sensors, magnetometer, barometer; GPS at its rate."""
     from controller.estimate_feedback import tuning_for
     from controller.estimator.filter import Estimator
     from sitl_bridge.vehicle import hover_rotor_speeds
@@ -95,22 +95,22 @@ def estimator_update_us(vehicle: Vehicle) -> float:
     estimator = Estimator(vehicle, 1.0 / RATE_HZ, tuning)
     speeds = np.array(hover_rotor_speeds(vehicle))
     still, up = (0.0, 0.0, 0.0), (0.0, 0.0, vehicle.gravity)
-    elapsed = 0.0
+    times = []
     for tick in range(STEPS // 2):
         now = tick / RATE_HZ
         east, north, height = tuning.field
-        began = time.perf_counter()
         estimator.imu(up, still)
         estimator.magnetometer((east + 1e-9 * (tick % 3), north, height))
         estimator.barometer(0.0)
         if tick % round(RATE_HZ * tuning.gps_period) == 0:
             estimator.gps(now, still, still)
+        began = time.perf_counter()
         estimator.tick(now)
+        times.append(time.perf_counter() - began)
         estimator.command(speeds)
-        elapsed += (time.perf_counter() - began) if estimator.flying else 0.0
         if tick == WARMING_TICKS:
             estimator.take_off(speeds)
-    return elapsed / (STEPS // 2 - WARMING_TICKS - 1) * 1e6
+    return statistics.median(times[WARMING_TICKS + 1 :]) * 1e6
 
 
 def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ON_TRUTH) -> dict[str, Any]:

@@ -49,8 +49,8 @@ def test_the_snatch_is_beyond_the_accelerometers_range(fly: Fly) -> None:
     """The load falls into its cable: more specific force than the sensor can show."""
     log = pq.read_table(fly("snatch")["state_log"])
     rise = np.diff(log["vehicle_vz_m_s"].to_numpy()) * 250.0 + 9.81
-    assert "sensors.accelerometer.range=12.0" in load_scenario("snatch").set
-    assert rise.max() > 13.0
+    assert "sensors.accelerometer.range=13.0" in load_scenario("snatch").set
+    assert rise.max() > 13.5
 
 
 def test_every_fault_is_a_shipped_scenario() -> None:
