@@ -135,7 +135,7 @@ def test_nothing_that_the_plant_says_raises() -> None:
 
 def test_the_plants_battery_brings_it_home() -> None:
     """BATTERY_STATUS on the HIL link: a warning, then return when critical, land in an emergency."""
-    flight = Flown("battery.capacity=0.5")
+    flight = Flown("battery.capacity=0.2")
     client = flight.client()
     flight.take_off(client)
     flight.run_until(lambda: flight.station.machine.mode.name == "RTL")
