@@ -13,16 +13,17 @@ from controller.reference import PATH
 from controller.state import STATE_SIZE, Array
 from sitl_bridge.compiled import Buffer, entry_point
 
-
-@entry_point(
+LAW_BUFFERS = (
     Buffer(DESIGN, (1,)),
     Buffer(ALLOCATION, (1,)),
     Buffer(PATH, (1,)),
     Buffer(MEMORY, (1,)),
     Buffer(WORK, (1,)),
-    Buffer(np.float64, (STATE_SIZE,)),
-    Buffer(np.float64, (MOST_ROTORS,)),
 )
+"""The array arguments of `control_step` in front of estimate and controls: a `Law`."""
+
+
+@entry_point(*LAW_BUFFERS, Buffer(np.float64, (STATE_SIZE,)), Buffer(np.float64, (MOST_ROTORS,)))
 def control_step(
     designs: Any, allocations: Any, paths: Any, memories: Any, works: Any, estimate: Array, controls: Array
 ) -> int:

@@ -109,14 +109,16 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     arguments = parser.parse_args()
     print(
-        "| l₀ / m | sensors | law flies on | load relative to vehicle, rms / cm | worst seed | Riccati bound "
-        "| load from reference, rms / cm | worst seed | NEES (95 %) | innovations within 95 % | limits |"
+        "| l₀ / m | sensors | law flies on | seeds | load relative to vehicle, rms / cm | worst seed "
+        "| Riccati bound | load from reference, rms / cm | worst seed | NEES (95 %) | innovations within 95 % "
+        "| limits |"
     )
-    print("|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    print("|" + 12 * "---|", flush=True)
     for case in CASES:
         row = row_of(case, arguments.seeds, arguments.duration, arguments.out.resolve())
         print(
-            f"| {case.rest_length:g} | {case.sensors} | {case.feedback} | {centimetres(row['relative_m'])} "
+            f"| {case.rest_length:g} | {case.sensors} | {case.feedback} | {arguments.seeds} "
+            f"| {centimetres(row['relative_m'])} "
             f"| {centimetres(row['relative_worst_m'])} | {centimetres(row['bound_m'])} "
             f"| {centimetres(row['absolute_m'])} | {centimetres(row['absolute_worst_m'])} "
             f"| {row['nees']:.3f} (1 ± {row['nees_bound']:.3f}) | {100 * row['innovations']:.1f} % "

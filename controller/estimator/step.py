@@ -87,7 +87,16 @@ def report(f: Filter, out: Array) -> None:
     out[EULER_OUT + 2] = math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))
 
 
-@entry_point(Buffer(FILTER, (1,)), Buffer(INPUT, (1,)), Buffer(np.float64, (OUTPUT_SIZE,)))
+ESTIMATOR_BUFFERS = (
+    Buffer(FILTER, (1,)),
+    Buffer(INPUT, (1,)),
+    Buffer(np.float64, (OUTPUT_SIZE,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+)
+"""State, input and estimate, the arguments of `tick`, and the speeds that `command` takes."""
+
+
+@entry_point(*ESTIMATOR_BUFFERS[:3])
 def tick(record: Any, measurements: Any, out: Array) -> int:
     """Predict to the tick's time, take in its measurements, and write the estimate `out` (18,), eq. 31.
 

@@ -74,7 +74,7 @@ class Tuning:
     """rad/s per sqrt(s)"""
     accel_bias_walk: float = 2e-4
     """m/s² per sqrt(s)"""
-    baro_walk: float = 0.02
+    baro_walk: float = 0.01
     """m per sqrt(s)"""
     accel_bias_std: float = 0.05
     """m/s², at the start"""

@@ -16,20 +16,20 @@ _PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
 ANSWER_SIZE = 128  # a frame of 81 bytes of payload, with room
 
 
-@entry_point(
+CONTROLS = Buffer(np.float64, (ACTUATOR_CONTROLS,))
+WRITE_BUFFERS = (
     Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
     Buffer(np.uint8, (_PAYLOAD_SIZE,)),
-    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
     Buffer(np.uint8, (ANSWER_SIZE,)),
-    int,
-    int,
-    int,
-    int,
 )
+"""The other array arguments of `write_answer`; `AnswerWriter.buffers` has them."""
+
+
+@entry_point(CONTROLS, *WRITE_BUFFERS, int, int, int, int)
 def write_answer(
+    controls: Any,
     records: Any,
     payload: Bytes,
-    controls: Any,
     out: Bytes,
     time_usec: int,
     armed: int,
@@ -59,7 +59,7 @@ class AnswerWriter:
         """The arrays of `write_answer` beside the controls."""
         self.view = out.data
         """Where an answer is written."""
-        self._write = write_answer.bind(record, payload, self.controls, out)
+        self._write = write_answer.bind(self.controls, *self.buffers)
 
     def answer(self, time_usec: int, armed: bool) -> bytes:
         """The frame that answers the tick of `time_usec`."""

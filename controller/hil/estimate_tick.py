@@ -8,23 +8,19 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from controller import step
-from controller.allocation import ALLOCATION, MOST_ROTORS
+from controller.allocation import MOST_ROTORS
 from controller.estimator import intake
 from controller.estimator import step as estimator
-from controller.estimator.layout import FILTER, INPUT, OUTPUT_SIZE
+from controller.estimator.step import ESTIMATOR_BUFFERS
 from controller.hil import answers, ticks
-from controller.hil.answers import ANSWER_SIZE
-from controller.hil.ticks import INCOMING, LOAD_TRUTH, SENSED, TICK, VEHICLE_TRUTH
-from controller.law import DESIGN, MEMORY, WORK
-from controller.reference import PATH
-from controller.state import STATE_SIZE, Array
-from sitl_bridge.compiled import Buffer, entry_point
+from controller.hil.answers import CONTROLS, WRITE_BUFFERS
+from controller.hil.ticks import LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
+from controller.state import Array
+from controller.step import LAW_BUFFERS
+from sitl_bridge.compiled import entry_point
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND
-from sitl_bridge.mavlink.framing import DATAGRAM, FRAME_TABLE, Bytes
-from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS
+from sitl_bridge.mavlink.framing import Bytes
 
 _read_tick = ticks.read_tick.python
 _give = intake.give.python
@@ -35,26 +31,11 @@ _write_answer = answers.write_answer.python
 
 
 @entry_point(
-    DATAGRAM,
-    FRAME_TABLE,
-    Buffer(INCOMING, (1,)),
-    Buffer(np.uint8, (INCOMING.itemsize,)),
-    Buffer(np.float64, (STATE_SIZE,)),
-    Buffer(SENSED, (1,)),
-    Buffer(np.int64, (2,)),
-    Buffer(FILTER, (1,)),
-    Buffer(INPUT, (1,)),
-    Buffer(np.float64, (OUTPUT_SIZE,)),
-    Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(DESIGN, (1,)),
-    Buffer(ALLOCATION, (1,)),
-    Buffer(PATH, (1,)),
-    Buffer(MEMORY, (1,)),
-    Buffer(WORK, (1,)),
-    Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
-    Buffer(np.uint8, (HIL_ACTUATOR_CONTROLS.dtype.itemsize,)),
-    Buffer(np.uint8, (ANSWER_SIZE,)),
+    *READ_BUFFERS,
+    *ESTIMATOR_BUFFERS,
+    *LAW_BUFFERS,
+    CONTROLS,
+    *WRITE_BUFFERS,
     int,
     int,
     int,
@@ -110,4 +91,4 @@ def answer_estimate(
     for i in range(MOST_ROTORS):
         rotor_speed[i] = controls[i] * allocations[0].largest_speed[i]
     _note_command(filters, rotor_speed)
-    return int(_write_answer(answer, answer_payload, controls, out, header[1], 1, sequence, system))
+    return int(_write_answer(controls, answer, answer_payload, out, header[1], 1, sequence, system))

@@ -101,7 +101,7 @@ def read_sensors(sensor: Any, out: Any) -> None:
     out.has_begun = bits & SENSOR_RESET != 0
 
 
-@entry_point(
+READ_BUFFERS = (
     DATAGRAM,
     FRAME_TABLE,
     Buffer(INCOMING, (1,)),
@@ -109,10 +109,11 @@ def read_sensors(sensor: Any, out: Any) -> None:
     Buffer(np.float64, (STATE_SIZE,)),
     Buffer(SENSED, (1,)),
     Buffer(np.int64, (2,)),
-    int,
-    int,
-    int,
 )
+"""The array arguments of `read_tick`; `TickReader.buffers` has them."""
+
+
+@entry_point(*READ_BUFFERS, int, int, int)
 def read_tick(
     data: Bytes,
     table: Any,

@@ -9,19 +9,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from controller import step
-from controller.allocation import ALLOCATION, MOST_ROTORS
 from controller.hil import answers, ticks
-from controller.hil.answers import ANSWER_SIZE
-from controller.hil.ticks import GPS, INCOMING, LOAD_TRUTH, SENSED, TICK, VEHICLE_TRUTH
-from controller.law import DESIGN, MEMORY, WORK
-from controller.reference import PATH
-from controller.state import STATE_SIZE, Array
-from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.mavlink.framing import DATAGRAM, FRAME_TABLE, Bytes
-from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS
+from controller.hil.answers import CONTROLS, WRITE_BUFFERS
+from controller.hil.ticks import GPS, LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
+from controller.state import Array
+from controller.step import LAW_BUFFERS
+from sitl_bridge.compiled import entry_point
+from sitl_bridge.mavlink.framing import Bytes
 
 _read_tick = ticks.read_tick.python
 _control_step = step.control_step.python
@@ -29,29 +24,7 @@ _write_answer = answers.write_answer.python
 _PLAIN = TICK | VEHICLE_TRUTH | LOAD_TRUTH
 
 
-@entry_point(
-    DATAGRAM,
-    FRAME_TABLE,
-    Buffer(INCOMING, (1,)),
-    Buffer(np.uint8, (INCOMING.itemsize,)),
-    Buffer(np.float64, (STATE_SIZE,)),
-    Buffer(SENSED, (1,)),
-    Buffer(np.int64, (2,)),
-    Buffer(DESIGN, (1,)),
-    Buffer(ALLOCATION, (1,)),
-    Buffer(PATH, (1,)),
-    Buffer(MEMORY, (1,)),
-    Buffer(WORK, (1,)),
-    Buffer(np.float64, (MOST_ROTORS,)),
-    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
-    Buffer(np.uint8, (HIL_ACTUATOR_CONTROLS.dtype.itemsize,)),
-    Buffer(np.uint8, (ANSWER_SIZE,)),
-    int,
-    int,
-    int,
-    int,
-    int,
-)
+@entry_point(*READ_BUFFERS, *LAW_BUFFERS, CONTROLS, *WRITE_BUFFERS, int, int, int, int, int)
 def answer_truth(
     data: Bytes,
     table: Any,
@@ -84,4 +57,4 @@ def answer_truth(
     if found & ~GPS != _PLAIN or header[1] <= last_time_usec:
         return 0
     _control_step(designs, allocations, paths, memories, works, estimate, controls)
-    return int(_write_answer(answer, answer_payload, controls, out, header[1], 1, sequence, system))
+    return int(_write_answer(controls, answer, answer_payload, out, header[1], 1, sequence, system))

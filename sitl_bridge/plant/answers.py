@@ -35,16 +35,18 @@ ANSWERED, ARMED, NOT_FINITE, OTHERS, FOREIGN, JUNK = 1, 2, 4, 8, 16, 32
 _FOREIGN_SHIFT = 8
 
 
-@entry_point(
+READ_BUFFERS = (
     DATAGRAM,
     FRAME_TABLE,
     Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
     Buffer(np.uint8, (_PAYLOAD_SIZE,)),
     Buffer(np.float64, (ACTUATOR_CONTROLS,)),
     Buffer(np.int64, (2,)),
-    int,
-    int,
 )
+"""The array arguments of `read_answer`; `AnswerReader.arrays` has them."""
+
+
+@entry_point(*READ_BUFFERS, int, int)
 def read_answer(
     data: Bytes,
     table: Any,

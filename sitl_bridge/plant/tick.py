@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.ids import ACTUATOR_CONTROLS
-from sitl_bridge.mavlink.framing import DATAGRAM, FRAME_TABLE, Bytes
-from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS
+from sitl_bridge.mavlink.framing import Bytes
 from sitl_bridge.plant import answers, dynamics, messages, rows, sensing
-from sitl_bridge.plant.answers import ANSWERED, ARMED
+from sitl_bridge.plant.answers import ANSWERED, ARMED, READ_BUFFERS
 from sitl_bridge.plant.dynamics import TABLE_ROWS, WORK_ROWS
 from sitl_bridge.plant.messages import DATAGRAM_SIZE, OUTGOING, STATE, is_due
 from sitl_bridge.plant.parameters import PARAMETERS
@@ -37,13 +35,7 @@ _write_tick = messages.write_tick.python
 
 
 @entry_point(
-    # what `answers.read_answer` takes
-    DATAGRAM,
-    FRAME_TABLE,
-    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
-    Buffer(np.uint8, (HIL_ACTUATOR_CONTROLS.dtype.itemsize,)),
-    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
-    Buffer(np.int64, (2,)),
+    *READ_BUFFERS,
     # the world, see `World.arrays`
     Buffer(PARAMETERS, (1,)),
     Buffer(SCHEDULE, (1,)),
