@@ -110,8 +110,8 @@ def main() -> None:
     arguments = parser.parse_args()
     print(
         "| l₀ / m | sensors | law flies on | seeds | load relative to vehicle, rms / cm | worst seed "
-        "| Riccati bound | load from reference, rms / cm | worst seed | NEES (95 %) | innovations within 95 % "
-        "| limits |"
+        "| Riccati bound | load from reference, rms / cm | worst seed | NEES (95 %) "
+        "| innovations within 95 % | limits |"
     )
     print("|" + 12 * "---|", flush=True)
     for case in CASES:
