@@ -12,6 +12,7 @@ from mavsdk.plugins.telemetry import LandedState
 
 METRES_PER_DEGREE = 111_180.0
 LEG = 5.0  # m, north and back
+LEG_TIME = 10.0  # s, to get there and come to rest
 
 
 async def heard(telemetry: TelemetryAsync, words: str) -> None:
@@ -45,10 +46,10 @@ async def main(connection: str) -> None:
             latitude = home.latitude_deg + goal / METRES_PER_DEGREE
             await action.goto_location(latitude, home.longitude_deg, here.absolute_altitude_m, math.nan)
             norths = []
-            while len(norths) < 20 or max(norths[-20:]) - min(norths[-20:]) > 0.01:
+            for _ in range(round(LEG_TIME / 0.1)):
                 norths.append((await telemetry.position_velocity_ned()).position.north_m)
                 await asyncio.sleep(0.1)
-            passed = max(norths) - norths[-1] if goal else norths[-1] - min(norths)
+            passed = max(norths) - goal if goal else goal - min(norths)
             print(f"LQR_Q_INT {weight:g}: at {norths[-1]:.2f} m north, passed by {100 * passed:.1f} cm")
         await action.return_to_launch()
         while await telemetry.armed():

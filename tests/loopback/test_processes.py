@@ -149,7 +149,7 @@ def test_a_port_in_use_is_one_clear_line(start: Start, port: int) -> None:
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["fly", "setpiont"], "setpiont: no such scenario; expected one of circle, hold, hover, setpoint"),
+        (["fly", "setpiont"], "setpiont: no such scenario; expected one of baro-drift, circle, "),
         (["fly", "hover", "--set", "cable.stiffness=-1"], "cable.stiffness = -1"),
         (["fly", "hover", "--vehicle", "nothing.toml"], "nothing.toml: no such vehicle"),
         (["fly", "hover", "--rate", "abc"], "argument --rate: 'abc': expected ticks a second, 20 to 1000"),
