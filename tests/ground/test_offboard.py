@@ -1,0 +1,116 @@
+"""Offboard set-points, and a controller that starts in flight."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.ground.targets import Follow
+from controller.trajectory import stopping_distance
+from tests.ground.in_flight import ACCEPTED, REJECTED, flying, local_setpoint, mode, stream
+from tests.ground.kinematic import PROFILE
+from tests.ground.rig import NAN, Rig
+
+
+def test_offboard_needs_set_points_first() -> None:
+    _rig, client = flying()
+    assert client.command(176, 1, 6, 0).result == REJECTED
+    assert "send them" in client.texts()[-1]
+
+
+def test_offboard_position_velocity_and_trajectory() -> None:
+    rig, client = flying()
+    stream(rig, client, local_setpoint(3, 2, -5), 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, local_setpoint(3, 2, -5), 6.0)
+    assert rig.view.position == pytest.approx((2, 3, 5), abs=0.05)
+    stream(rig, client, local_setpoint(NAN, NAN, NAN, mask=0b111111000111, vx=1.0), 2.0)
+    assert isinstance(rig.target, Follow)
+    assert rig.target.velocity == pytest.approx((0, 1, 0))
+    assert all(math.isnan(p) for p in rig.target.position)
+    assert rig.view.position[1] == pytest.approx(5.0, abs=0.1)
+    # body frame: forward is where the nose points
+    yaw = math.pi / 2 - 1.0
+    stream(rig, client, local_setpoint(0, 0, -5, yaw=1.0), 0.2)
+    stream(rig, client, local_setpoint(0, 0, 0, mask=0b110111000111, frame=8, vx=1.0), 0.2)
+    assert rig.target.velocity == pytest.approx((math.cos(yaw), math.sin(yaw), 0), abs=1e-6)
+    full = local_setpoint(1, 2, -4, mask=0, vx=0.5, vy=0.25, vz=-0.1, afx=0.3, yaw=math.pi / 2, yaw_rate=0.2)
+    stream(rig, client, full, 0.2)
+    target = rig.target
+    assert isinstance(target, Follow)
+    assert target.velocity == pytest.approx((0.25, 0.5, 0.1))
+    assert target.acceleration == pytest.approx((0, 0.3, 0), abs=1e-6)
+    assert target.yaw == pytest.approx(0.0, abs=1e-6)
+    assert target.yaw_rate == pytest.approx(-0.2)
+    # the load lags below and behind the accelerating vehicle by the cable's length
+    offset = [v - p for v, p in zip((2, 1, 4), target.position, strict=True)]
+    assert math.hypot(*offset) == pytest.approx(PROFILE.hover_length)
+    assert offset[1] > 0
+
+
+def test_a_set_point_of_the_load_is_the_loads() -> None:
+    rig, client = flying()
+    message = local_setpoint(0, 0, -3, system=101, component=35)
+    stream(rig, client, message, 0.3)
+    client.command(176, 1, 6, 0)
+    stream(rig, client, message, 4.0)
+    assert rig.view.load_position == pytest.approx((0, 0, 3), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        (local_setpoint(0, 0, -5, mask=0b111111111111), "without position or velocity"),
+        (local_setpoint(0, 0, -5, mask=0b110000111111, afx=1.0), "without position or velocity"),
+        (local_setpoint(math.inf, 0, -5), "beyond all bounds"),
+        (local_setpoint(0, 0, -5, frame=9), "body's frame|frame 9"),
+        (local_setpoint(9000, 0, -5), "GF_MAX_HOR_DIST"),
+        (local_setpoint(0, 0, -0.5), "too low"),
+        (mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5), "Attitude"),
+    ],
+)
+def test_set_points_that_cannot_be_flown_are_refused_and_do_not_count(message: Any, words: str) -> None:
+    rig, client = flying()
+    stream(rig, client, message, 0.5)
+    assert any(word in client.texts()[-1] for word in words.split("|"))
+    assert client.command(176, 1, 6, 0).result == REJECTED
+
+
+def test_one_client_at_a_time_has_offboard_control() -> None:
+    rig, client = flying()
+    other = rig.client(14540, link=1)
+    stream(rig, client, local_setpoint(3, 2, -5), 0.3)
+    client.command(176, 1, 6, 0)
+    other.send(local_setpoint(-3, -2, -5))
+    stream(rig, client, local_setpoint(3, 2, -5), 0.3)
+    assert rig.target.position[:2] == pytest.approx((2, 3))
+    assert "Another client" in other.texts()[-1]
+
+
+def test_set_points_faster_than_the_envelope_are_limited() -> None:
+    rig, client = flying()
+    message = local_setpoint(0, 0, 0, mask=0b110111000111, vx=30.0, vy=40.0, vz=-50.0)
+    stream(rig, client, message, 0.3)
+    client.command(176, 1, 6, 0)
+    stream(rig, client, message, 0.2)
+    assert rig.target.velocity == pytest.approx((4.8, 3.6, 2.0))
+
+
+def test_a_controller_that_starts_in_flight_holds() -> None:
+    rig, _ = flying()
+    height, climb = rig.view.position[2], rig.view.velocity[2]
+    again = Rig(view=rig.view)
+    client = again.client()
+    again.station.machine.resume(again.view, again.now)
+    again.run(5.0)
+    assert again.station.armed
+    assert mode(again) == "HOLD"
+    expected = height + stopping_distance(climb, 2.0)
+    assert again.view.position[2] == pytest.approx(expected, abs=0.05)
+    assert "Started in flight" in client.texts()[0]
+    assert client.command(21).result == ACCEPTED
+    again.run_until(lambda: not again.station.armed)
+    assert again.view.vehicle_on_ground
