@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from controller.estimator.forces import cable, drag_rate
 from controller.estimator.layout import (
     ACCEL_BIAS,
     ACCELEROMETER,
@@ -35,7 +36,6 @@ from controller.estimator.layout import (
     Array,
     Filter,
 )
-from controller.estimator.process import cable, drag_rate
 from controller.estimator.rotation import matrix
 from controller.estimator.update import ROW, begin, fuse, inject, predicted_variance
 from sitl_bridge.compiled import kernel
