@@ -159,6 +159,7 @@ MEMORY = np.dtype(
         ("pull", "f8", 3),
         ("pull_time", "f8"),
         ("hung", "f8", 2),
+        ("hung_variance", "f8", 2),
         ("load_resets", "i8"),
         ("stale_count", "i8"),
         ("last_magnetometer", "f8", 3),
@@ -187,7 +188,7 @@ MEMORY = np.dtype(
 
 grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
 something below has carried the vehicle or the load; hung: m, world, where the load hung last with all its
-weight.
+weight, and how well that was known relative to the vehicle.
 innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
 within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """

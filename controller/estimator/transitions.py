@@ -11,6 +11,7 @@ from typing import Any
 from controller.estimator.layout import (
     ACCELEROMETER,
     ATTITUDE,
+    ERROR_SIZE,
     FLYING,
     FORCE,
     LOAD,
@@ -29,7 +30,7 @@ from controller.estimator.layout import (
     Filter,
 )
 from controller.estimator.sensors import measured_pull
-from controller.estimator.update import ROW, begin, fuse, inject, set_part
+from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
 PULL_TIME = 0.04
@@ -51,6 +52,10 @@ CARRIED = 0.2
 LIGHT, HANGING, LIFTING = 0.4, 0.8, 0.95
 """Shares of its weight: less than LIGHT on the cable, and a load has been set down; with more than HANGING it
 hangs where it is; with LIFTING one that lay leaves the ground."""
+HARDEST_BUMP = 0.5
+"""m/s in one tick; a sample that shows more shows nothing."""
+SET_DOWN_STD = 0.03
+"""m: how far a load slides as it is set down, and how flat the ground is."""
 KNOWN = 0.2
 """Of the cable's length: a load whose place is known better is not looked for anew."""
 STRETCH_STD = 0.02
@@ -80,6 +85,8 @@ def watch(f: Filter, measured: Any) -> None:
         if m.contact_time > CONTACT_TIME:
             stand(f)
             return
+        if low and m.rejected_in_row[ACCELEROMETER] > 0:
+            bump(f)
     if m.rejected_in_row[ACCELEROMETER] * p.period > CONFIRM_TIME:
         # The accelerometer and the model have parted: where the load is has to be found again.
         m.rejected_in_row[ACCELEROMETER] = 0
@@ -105,6 +112,7 @@ def watch(f: Filter, measured: Any) -> None:
     if down > HANGING * weight:
         for axis in range(2):
             m.hung[axis] = x[X_POSITION + axis] + x[X_LOAD + axis]
+            m.hung_variance[axis] = f.P[LOAD + axis, LOAD + axis]
     set_down = p.has_ground and down < LIGHT * weight and _load_is_low(f)
     m.lying_time = m.lying_time + p.period if set_down else 0.0
     if m.pull_time > CONFIRM_TIME:
@@ -142,25 +150,48 @@ def lay_load(f: Filter) -> None:
     """
     p, m, x = f.p, f.m, f.x
     m.load_mode = LOAD_ON_GROUND
-    x[X_LOAD] = m.hung[0] - x[X_POSITION]
-    x[X_LOAD + 1] = m.hung[1] - x[X_POSITION + 1]
+    for axis in range(2):
+        x[X_LOAD + axis] = m.hung[axis] - x[X_POSITION + axis]
+        set_part(f, LOAD + axis, 1, math.sqrt(m.hung_variance[axis]) + SET_DOWN_STD)
     x[X_LOAD + 2] = p.lying_height - x[X_POSITION + 2]
+    lie_below(f)
     for axis in range(3):
         x[X_LOAD_VELOCITY + axis] = -x[X_VELOCITY + axis]
-    set_part(f, LOAD, 3, 0.1 * p.rest_length)
+        x[X_FORCE + axis] = 0.0
     set_part(f, LOAD_VELOCITY, 3, 0.5)
+    set_part(f, FORCE, 3, p.force_std)
+
+
+@kernel
+def lie_below(f: Filter) -> None:
+    """The load's height is the ground's: below the vehicle it is as far as the vehicle is high."""
+    cov, below, above = f.P, LOAD + 2, POSITION + 2
+    set_part(f, below, 1, SET_DOWN_STD)
+    for j in range(ERROR_SIZE):
+        if j != below:
+            cov[below, j] = cov[j, below] = -cov[above, j]
+    cov[below, below] += cov[above, above]
+    for k in range(f.m.clone_width):
+        f.Pxz[below, k] = -f.Pxz[above, k]
 
 
 @kernel
 def take_up(f: Filter, pull: float) -> None:
-    """The cable is taut although the model says slack: it is as long as the pull shows, `pull` in N."""
-    p, x = f.p, f.x
-    length = math.sqrt(x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2) + 1e-9
-    begin(f)
-    for axis in range(3):
-        f.vectors[ROW, LOAD + axis] = x[X_LOAD + axis] / length
-    fuse(f, p.rest_length + pull / p.stiffness - length, (STRETCH_STD * p.rest_length) ** 2)
-    inject(f)
+    """The cable is taut although the model says slack: it is as long as the pull shows, `pull` in N.
+
+    Whether vehicle or load is higher than believed is all that this is about. To the side the load stays
+    where it is known to be: the slope of the cable's length over that place, taken for decimetres, would
+    move it by decimetres for a centimetre of cable. The squares of what is unknown there widen the height.
+    """
+    p, x, cov = f.p, f.x, f.P
+    length = p.rest_length + pull / p.stiffness
+    across = x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2
+    height = math.sqrt(max(length * length - across, 0.01 * length * length))
+    lower = (cov[LOAD, LOAD] + cov[LOAD + 1, LOAD + 1]) / (2.0 * height)
+    x[X_LOAD + 2] = -height
+    set_part(f, LOAD + 2, 1, math.hypot(STRETCH_STD * p.rest_length, math.sqrt(2.0) * lower))
+    x[X_FORCE + 2] = 0.0  # all that pulls has been taken for the cable
+    set_part(f, FORCE + 2, 1, p.force_std)
 
 
 @kernel
@@ -172,6 +203,7 @@ def lift_load(f: Filter, pull: float) -> None:
     if f.P[LOAD, LOAD] > known or f.P[LOAD + 1, LOAD + 1] > known:
         place_load(f, pull)
         return
+    take_up(f, pull)
     for i in range(LOAD_VELOCITY, LOAD_VELOCITY + 3):
         f.P[i, i] += 0.2**2
 
@@ -183,6 +215,8 @@ def leave_ground(f: Filter) -> None:
     f.m.grounded = False
     f.m.contact_time = 0.0
     set_part(f, FORCE, 3, f.p.force_std)
+    if f.m.load_mode == LOAD_ON_GROUND:
+        return
     for part in (LOAD, LOAD_VELOCITY):
         for i in range(part, part + 3):
             f.P[i, i] += f.p.initial_std[i] ** 2
@@ -203,6 +237,23 @@ def stand(f: Filter) -> None:
         f.x[X_FORCE + axis] = 0.0
         f.x[X_VELOCITY + axis] = 0.0
         f.P[ATTITUDE + axis, ATTITUDE + axis] += 0.01**2
+
+
+@kernel
+def bump(f: Filter) -> None:
+    """Something low was hit, which the accelerometer's gate took for an outlier: the velocity has changed.
+
+    Left with the velocity that it had before the touch-down, the filter would refuse what GPS says of it.
+    """
+    m, squares = f.m, 0.0
+    for axis in range(3):
+        squares += m.innovation[ACCELEROMETER, axis] ** 2
+    change = min(squares * f.p.period**2, HARDEST_BUMP**2)
+    for axis in range(3):
+        f.P[VELOCITY + axis, VELOCITY + axis] += change
+        f.P[LOAD_VELOCITY + axis, LOAD_VELOCITY + axis] += change
+        f.P[VELOCITY + axis, LOAD_VELOCITY + axis] -= change
+        f.P[LOAD_VELOCITY + axis, VELOCITY + axis] -= change
 
 
 @kernel

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
+from scipy.stats import chi2
 
-from controller.estimator.layout import LOAD_ON_CABLE, LOAD_ON_GROUND
+from controller.estimator.layout import LOAD_ON_CABLE, LOAD_ON_GROUND, PARTS, X_LOAD, Array
 from controller.ground.modes import Reposition
 from controller.ground.px4_modes import Mode
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.sensors.instruments import LOST, WORKS
-from tests.estimator.guided import GuidedFlight
+from tests.estimator.guided import RATE_HZ, GuidedFlight
 
 NAN = math.nan
 
@@ -100,3 +102,36 @@ def test_a_controller_that_comes_on_the_ground_stays_there() -> None:
     assert not flight.machine.armed
     assert flight.machine.arming_faults() == []
     assert flight.feedback.estimator.grounded
+
+
+@pytest.mark.parametrize(
+    ("name", "preset", "seed"),
+    [("iris", "consumer", 4), ("iris", "rtk", 1), ("heavy", "consumer", 1), ("heavy", "consumer", 4)],
+)
+def test_pick_up_and_set_down_leave_no_false_certainty(name: str, preset: str, seed: int) -> None:
+    """The load's place, believed and true, agree within what the covariance says, in the air and after."""
+    flight = GuidedFlight(load_vehicle(name, [f"sensors.preset={preset}"]), seed)
+    estimator = flight.feedback.estimator
+
+    def off() -> tuple[Array, Array]:
+        vehicle, load = flight.truth()
+        covariance = estimator.error_covariance[PARTS["load"], PARTS["load"]]
+        return load - vehicle - estimator.nominal[X_LOAD : X_LOAD + 3], covariance
+
+    def normalised() -> float:
+        error, covariance = off()
+        return float(error[:2] @ np.linalg.solve(covariance[:2, :2], error[:2]) / 2.0)
+
+    flight.arm_and_take_off(5.0)
+    squares = []
+    for _ in range(20):
+        flight.wait(0.5)
+        squares.append(normalised())
+    # One draw of two numbers, seen again and again as it fades: chi-square with two degrees of freedom.
+    assert np.mean(squares) < chi2.ppf(0.997, 2) / 2.0
+    assert flight.machine.set_mode(Mode.LAND, flight.now).ok
+    flight.fly(lambda: not flight.machine.armed, 60.0, "landed and disarmed")
+    landing = flight.errors()[-round(5.0 * RATE_HZ) :]
+    assert np.abs(landing[:, 2]).max() < 0.25  # a touch-down is no reason to lose the height
+    assert normalised() < chi2.ppf(0.997, 2) / 2.0
+    assert abs(off()[0][2]) < 0.05

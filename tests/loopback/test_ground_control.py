@@ -228,8 +228,11 @@ def assert_figure_eight(flown: swing.Flown) -> None:
     up = flown.time[np.abs(flown.load[:, 2] - 3.0) < 0.05]
     load = flown.between(float(up[0]) + 3.0, float(up[-1]) - 4.0).load[::25]
     away = np.linalg.norm(load[:, None] - curve, axis=2).min(axis=1)
-    print(f"figure eight: the load {away.max():.3f} m from the curve at most")
-    assert away.max() < 0.1
+    rms = float(np.sqrt(np.mean(away**2)))
+    print(f"figure eight: the load {rms:.3f} m rms from the curve, {away.max():.3f} m at most")
+    # On `rtk` a load on a short cable keeps within 4 cm rms in each of the two directions across the curve.
+    assert rms < math.sqrt(2.0) * 0.04
+    assert away.max() < 3.0 * math.sqrt(2.0) * 0.04
     assert load[:, 1].min() < -2.9
 
 
