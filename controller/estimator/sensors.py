@@ -97,31 +97,72 @@ def ratio_of(f: Filter, sensor: int, axis: int, innovation: float, noise: float)
 
 
 @kernel
+def saturated(f: Filter, specific_force: float) -> bool:
+    """Whether an axis of the accelerometer is at its limit, where it says nothing but "much"."""
+    return bool(abs(specific_force) >= 0.999 * f.p.accelerometer_range)
+
+
+@kernel
 def accelerometer(f: Filter, measured: Any) -> None:
     """Specific force, m/s², body: (thrust z_b + R'F_cable) / m_v + R'force + bias; at rest R'g + bias.
 
     Standing, it shows which way is up. Flying, it shows the cable, and so the load.
     """
     p, m = f.p, f.m
-    limit = p.accelerometer_range * 0.999
-    if abs(measured[0]) >= limit or abs(measured[1]) >= limit or abs(measured[2]) >= limit:
-        m.rejected[ACCELEROMETER] += 1  # saturated: it says nothing but "much"; the model carries on
-        return
     noise = p.sensor_std[ACCELEROMETER] * p.sensor_std[ACCELEROMETER]
     if m.vehicle_mode == FLYING:
         noise += p.gust_std * p.gust_std
     begin(f)
-    worst, squares = 0.0, 0.0
+    worst, squares, used = 0.0, 0.0, 0
     for axis in range(3):
+        if saturated(f, measured[axis]):
+            continue
         innovation = measured[axis] - _accelerometer_row(f, axis)
         worst = max(worst, ratio_of(f, ACCELEROMETER, axis, innovation, noise))
+        used += 1
+    if used < 3:
+        m.rejected[ACCELEROMETER] += 1
     if not passes(f, ACCELEROMETER, worst):
         return
+    taut = m.tension > 0.0 and not p.two_way and m.vehicle_mode == FLYING
+    before = along_cable(f)
     for axis in range(3):
+        if saturated(f, measured[axis]):
+            continue
         innovation = measured[axis] - _accelerometer_row(f, axis)
         squares += fuse(f, innovation, noise)
     inject(f)
-    book(f, ACCELEROMETER, squares, 3)
+    book(f, ACCELEROMETER, squares, used)
+    if taut:
+        allow_for_slack(f, before)
+
+
+@kernel
+def along_cable(f: Filter) -> float:
+    """Variance of the load's distance, m²."""
+    x, cov, total, square = f.x, f.P, 0.0, 1e-12
+    for i in range(3):
+        square += x[X_LOAD + i] ** 2
+        for j in range(3):
+            total += x[X_LOAD + i] * cov[LOAD + i, LOAD + j] * x[X_LOAD + j]
+    return total / square
+
+
+@kernel
+def allow_for_slack(f: Filter, before: float) -> None:
+    """A cable that was thought taut and is found slack is known to be no longer than that, and no more.
+
+    before: the variance (m²) of its length before the measurement, which is what remains.
+    """
+    x, cov = f.x, f.P
+    cable(f, f.vectors[0])
+    widened = before - along_cable(f)
+    if f.m.tension > 0.0 or widened <= 0.0:
+        return
+    square = x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2
+    for i in range(3):
+        for j in range(3):
+            cov[LOAD + i, LOAD + j] += widened * x[X_LOAD + i] * x[X_LOAD + j] / square
 
 
 @kernel

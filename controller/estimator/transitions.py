@@ -29,7 +29,7 @@ from controller.estimator.layout import (
     X_VELOCITY,
     Filter,
 )
-from controller.estimator.sensors import measured_pull
+from controller.estimator.sensors import measured_pull, saturated
 from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
@@ -70,6 +70,9 @@ def watch(f: Filter, measured: Any) -> None:
         leave_ground(f)
     if m.vehicle_mode != FLYING:
         return
+    for axis in range(3):
+        if saturated(f, measured[axis]):
+            return
     out = f.vectors[0]
     if not measured_pull(f, measured, out) < IMPOSSIBLE_PULL * p.load_mass * p.gravity:
         return
@@ -262,15 +265,21 @@ def place_load(f: Filter, pull: float) -> None:
     p, m, x = f.p, f.m, f.x
     m.load_resets += 1
     length = math.sqrt(x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2)
+    across = along = 0.15 * p.rest_length
     if pull > 0.2 * p.load_mass * p.gravity:
         length = p.rest_length + pull / p.stiffness
         for axis in range(3):
             x[X_LOAD + axis] = m.pull[axis] / pull * length
             x[X_LOAD_VELOCITY + axis] = 0.0
+        along = STRETCH_STD * p.rest_length
     elif length > p.rest_length and not p.two_way:
         for axis in range(3):
             x[X_LOAD + axis] *= 0.98 * p.rest_length / length
-    set_part(f, LOAD, 3, 0.15 * length)
+    set_part(f, LOAD, 3, across)
+    for i in range(3):
+        for j in range(3):
+            part = x[X_LOAD + i] * x[X_LOAD + j] / (length * length)
+            f.P[LOAD + i, LOAD + j] += (along * along - across * across) * part
     set_part(f, LOAD_VELOCITY, 3, 1.5)
     for axis in range(3):
         x[X_FORCE + axis] = 0.0  # all that pulls has been taken for the cable

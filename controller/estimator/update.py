@@ -8,12 +8,18 @@ Rows of `Filter.vectors`: 0 and 1 belong to callers' small scratch, the rest is 
 
 from __future__ import annotations
 
+import math
+
 from controller.estimator.layout import (
     ATTITUDE,
     CLONE_SIZE,
     ERROR_SIZE,
+    LOAD,
+    LOAD_ON_CABLE,
     X_ATTITUDE,
+    X_LOAD,
     X_RATES,
+    Array,
     Filter,
 )
 from controller.estimator.rotation import turn
@@ -31,6 +37,9 @@ SHARED_CLONES = 6
 """Covariance of the remembered quantities with the measured one (CLONE_SIZE,)."""
 CORRECTION_CLONES = 7
 """The correction of the remembered quantities (CLONE_SIZE,)."""
+
+SMALLEST_SWING = 1e-6
+"""rad; a smaller turn of the cable changes nothing."""
 
 
 @kernel
@@ -153,10 +162,63 @@ def inject(f: Filter) -> None:
     for i in range(ATTITUDE):
         x[i] += correction[i]
     turn(x, correction[ATTITUDE], correction[ATTITUDE + 1], correction[ATTITUDE + 2])
+    rx, ry, rz = x[X_LOAD], x[X_LOAD + 1], x[X_LOAD + 2]
     for i in range(ATTITUDE + 3, ERROR_SIZE):
         x[i + X_RATES - X_ATTITUDE - 3] += correction[i]
     for k in range(f.m.clone_width):
         f.z[k] += f.vectors[CORRECTION_CLONES, k]
+    if f.m.load_mode == LOAD_ON_CABLE:
+        swing(f, rx, ry, rz)
+
+
+@kernel
+def swing(f: Filter, rx: float, ry: float, rz: float) -> None:
+    """Take the correction of a hanging load, which was at (rx, ry, rz), for a turn and a stretch of it.
+
+    The pull shows how long the cable is to millimetres, and where the load is to the side to decimetres.
+    Moved along the tangent, the load would come to hang on a longer cable; and a covariance that is narrow
+    along the old cable would, along the new one, claim to know the place to the side. So it turns as well.
+    """
+    correction, x, cov = f.vectors[CORRECTION], f.x, f.P
+    length = math.sqrt(rx * rx + ry * ry + rz * rz) + 1e-9
+    ex, ey, ez = rx / length, ry / length, rz / length
+    dx, dy, dz = correction[LOAD], correction[LOAD + 1], correction[LOAD + 2]
+    along = ex * dx + ey * dy + ez * dz
+    dx, dy, dz = dx - along * ex, dy - along * ey, dz - along * ez
+    across = math.sqrt(dx * dx + dy * dy + dz * dz)
+    angle = across / length
+    if angle < SMALLEST_SWING:
+        return
+    sine, cosine = math.sin(angle), math.cos(angle)
+    dx, dy, dz = dx / across, dy / across, dz / across
+    e, d, turn_by = (ex, ey, ez), (dx, dy, dz), f.vectors[SCRATCH]
+    for i in range(3):
+        x[X_LOAD + i] = (length + along) * (cosine * e[i] + sine * d[i])
+        for j in range(3):  # the rotation that takes e to cos e + sin d
+            turn_by[3 * i + j] = (cosine - 1.0) * (e[i] * e[j] + d[i] * d[j])
+            turn_by[3 * i + j] += sine * (d[i] * e[j] - e[i] * d[j])
+        turn_by[4 * i] += 1.0
+    _turn_rows(turn_by, f.Pxz, 0, f.m.clone_width)
+    _turn_rows(turn_by, cov, 0, ERROR_SIZE)
+    for i in range(LOAD, LOAD + 3):
+        for j in range(ERROR_SIZE):
+            if j < LOAD or j >= LOAD + 3:
+                cov[j, i] = cov[i, j]
+        for j in range(LOAD, i):  # the block is turned from the left; transposed and turned again it is whole
+            cov[i, j], cov[j, i] = cov[j, i], cov[i, j]
+    _turn_rows(turn_by, cov, LOAD, LOAD + 3)
+    for i in range(LOAD, LOAD + 3):
+        for j in range(LOAD, i):
+            cov[i, j] = cov[j, i]
+
+
+@kernel
+def _turn_rows(turn_by: Array, matrix: Array, start: int, end: int) -> None:
+    """Multiply the load's rows of a matrix by a rotation (9,) from the left, in columns start to end."""
+    for j in range(start, end):
+        a, b, c = matrix[LOAD, j], matrix[LOAD + 1, j], matrix[LOAD + 2, j]
+        for i in range(3):
+            matrix[LOAD + i, j] = turn_by[3 * i] * a + turn_by[3 * i + 1] * b + turn_by[3 * i + 2] * c
 
 
 @kernel

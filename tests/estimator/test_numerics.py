@@ -2,10 +2,15 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from scipy.spatial.transform import Rotation
 
 from controller.estimator.filter import Estimator, eq31_jacobian
-from controller.estimator.layout import ERROR_SIZE, SENSORS
+from controller.estimator.layout import ERROR_SIZE, LOAD_ON_CABLE, PARTS, SENSORS, X_LOAD, Array
 from controller.estimator.tuning import CONSUMER
+from controller.estimator.update import CORRECTION, SMALLEST_SWING, inject
 from sitl_bridge.vehicle import hover_rotor_speed
 from tests.estimator.flights import PERIOD
 from tests.estimator.test_accuracy import paper
@@ -53,6 +58,34 @@ def test_covariance_over_a_million_updates() -> None:
     assert np.linalg.eigvalsh(normalised).min() > 1e-9
     assert np.all(np.diag(cov)[:12] <= 1.05 * np.diag(steady)[:12])
     assert np.all(np.isfinite(estimator.state()))
+
+
+@given(hnp.arrays(float, 3, elements=st.floats(-0.5, 0.5)), st.integers(0, 2**32 - 1))
+def test_a_correction_turns_the_hanging_load(correction: Array, seed: int) -> None:
+    """What lies along the cable stretches it, the rest turns it, and the covariance turns with it."""
+    estimator = Estimator(paper(1.0), PERIOD)
+    estimator.memory["load_mode"] = LOAD_ON_CABLE
+    f = estimator.arrays[0].view(np.recarray)[0]
+    part = PARTS["load"]
+    random = np.random.default_rng(seed)
+    place = random.normal(loc=(0.0, 0.0, -3.0))
+    root = random.normal(size=(ERROR_SIZE, ERROR_SIZE))
+    before = root @ root.T
+    along = place / np.linalg.norm(place)
+    f.x[X_LOAD : X_LOAD + 3], f.P[...] = place, before
+    f.vectors[CORRECTION] = 0.0
+    f.vectors[CORRECTION][part] = correction
+    inject(f)
+    now = np.array(f.x[X_LOAD : X_LOAD + 3])
+    assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(place) + along @ correction, abs=1e-8)
+    across = correction - along * (along @ correction)
+    angle = np.linalg.norm(across) / np.linalg.norm(place)
+    rotation = Rotation.from_rotvec(angle * np.cross(along, across / max(1e-300, np.linalg.norm(across))))
+    assert now / np.linalg.norm(now) == pytest.approx(rotation.apply(along), abs=1e-9)
+    turned = np.eye(ERROR_SIZE)
+    turned[part, part] = rotation.as_matrix()
+    assert np.abs(f.P - turned @ before @ turned.T).max() < 200.0 * SMALLEST_SWING
+    assert np.array_equal(f.P, f.P.T)
 
 
 def test_covariance_in_the_order_of_eq_31() -> None:

@@ -45,6 +45,16 @@ def test_survives(scenario: str, fly: Fly) -> None:
     assert log["vehicle_z_m"].to_numpy().min() > 18.0
 
 
+@pytest.mark.parametrize(("accelerometer_range", "seed"), [(12.0, 1), (13.0, 3), (14.0, 1), (160.0, 1)])
+def test_survives_the_snatch_whatever_the_range(accelerometer_range: float, seed: int, fly: Fly) -> None:
+    """Just above hover, or never reached: the load is found again, and is where the estimate has it."""
+    assert load_scenario("snatch").feedback == "estimate"
+    chosen = ("--set", f"sensors.accelerometer.range={accelerometer_range}", "--seed", str(seed))
+    summary = fly("snatch", *chosen)
+    assert summary["steady_state_error_m"] < FAULTS["snatch"].strays
+    assert max(summary["estimate"]["load_relative_rms_m"]) < FAULTS["snatch"].relative
+
+
 def test_the_snatch_is_beyond_the_accelerometers_range(fly: Fly) -> None:
     """The load falls into its cable: more specific force than the sensor can show."""
     log = pq.read_table(fly("snatch")["state_log"])
