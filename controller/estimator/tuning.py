@@ -21,6 +21,7 @@ from controller.estimator.layout import (
     SENSOR_COUNT,
     TRACKER,
 )
+from sitl_bridge.frames import STANDARD_GRAVITY
 from sitl_bridge.vehicle import Vehicle
 
 Triple = tuple[float, float, float]
@@ -44,7 +45,7 @@ class Tuning:
     """m, when the message does not say"""
     gps_velocity_std: Triple = (0.1, 0.1, 0.15)
     """m/s, likewise"""
-    accelerometer_range: float = 16.0 * 9.80665
+    accelerometer_range: float = 16.0 * STANDARD_GRAVITY
     """m/s²; a sample at the limit is not used"""
     gyroscope_range: float = math.radians(2000.0)
     """rad/s; likewise"""

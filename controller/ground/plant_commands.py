@@ -18,6 +18,8 @@ REPEAT = 0.1
 """s between two sendings"""
 PATIENCE = 1.0
 """s for an answer: ground stations ask twice meanwhile"""
+LATENESS = 0.5
+"""s: so long after the first answer to a command that was sent several times the others may come"""
 INJECT_FAILURE: int = mavlink.MAV_CMD_INJECT_FAILURE
 
 Answer = Callable[[Verdict, float], None]
@@ -35,6 +37,11 @@ class PlantCommands:
     def __init__(self) -> None:
         self._waiting: list[_Pending] = []
         self._due = math.inf
+        self._sent = 0
+        """How often the first of them was sent"""
+        self._late = 0
+        """Acknowledgements of what is answered that may still come, until..."""
+        self._late_until = -math.inf
 
     def inject_failure(self, parameters: tuple[float, ...], now: float, answer: Answer) -> None:
         """Ask the plant to let something fail; `answer` is called with what comes of it, and when."""
@@ -44,7 +51,11 @@ class PlantCommands:
 
     def heard(self, acknowledgement: Any, now: float) -> None:
         """The plant's COMMAND_ACK."""
-        if self._waiting and acknowledgement.command == INJECT_FAILURE:
+        if acknowledgement.command != INJECT_FAILURE:
+            return
+        if self._late and now < self._late_until:
+            self._late -= 1
+        elif self._sent:
             self._finish(_verdict(acknowledgement.result), now)
 
     def to_plant(self, now: float) -> list[Any]:
@@ -56,6 +67,7 @@ class PlantCommands:
             self._finish(Verdict(mavlink.MAV_RESULT_FAILED, text), now)
             return self.to_plant(now)
         self._due = now + REPEAT
+        self._sent += 1
         parameters = self._waiting[0].parameters
         return [mavlink.MAVLink_command_long_message(0, 0, INJECT_FAILURE, 0, *parameters)]
 
@@ -65,6 +77,7 @@ class PlantCommands:
 
     def _finish(self, verdict: Verdict, now: float) -> None:
         done = self._waiting.pop(0)
+        self._late, self._late_until, self._sent = self._sent - 1, now + LATENESS, 0
         self._due = now if self._waiting else math.inf
         done.answer(verdict, now)
 

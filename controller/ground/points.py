@@ -10,8 +10,6 @@ from controller.ground.view import Profile, VehicleView
 from controller.trajectory import stopping_distance
 from sitl_bridge.frames import Triple
 
-GRAVITY = 9.81
-
 
 def below(vehicle: Triple, hanging: float) -> Triple:
     """The load's place for the vehicle's, m."""
@@ -37,7 +35,7 @@ def filled(asked: Triple, here: Triple) -> Triple:
 def hanging_under(acceleration: Triple, profile: Profile) -> Triple:
     """From the load to the vehicle for a steady acceleration (m/s², NaN: none), m."""
     pull = [0.0 if math.isnan(a) else a for a in acceleration]
-    pull[2] += GRAVITY
+    pull[2] += profile.gravity
     size = math.hypot(*pull)
     if size < 1e-3:
         return (0.0, 0.0, profile.hover_length)

@@ -25,6 +25,8 @@ class Profile:
     """m, of the cable"""
     hover_length: float
     """m, of the cable with the load at rest on it"""
+    gravity: float
+    """m/s²"""
     has_ground: bool
     """False: there is nothing to land on (`paper`)."""
 
@@ -48,6 +50,7 @@ def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> 
         LocalOrigin(home.latitude, home.longitude, home.altitude),
         vehicle.cable.rest_length,
         vehicle.hover_length,
+        vehicle.gravity,
         has_ground,
     )
 

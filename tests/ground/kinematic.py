@@ -9,7 +9,7 @@ from controller.ground.view import Profile, VehicleView
 from sitl_bridge.frames import LocalOrigin, Triple, quaternion_from_euler
 
 ZURICH = (47.397742, 8.545594, 488.0)
-PROFILE = Profile("kinematic", 0, LocalOrigin(*ZURICH), 1.5, 1.6, True)
+PROFILE = Profile("kinematic", 0, LocalOrigin(*ZURICH), 1.5, 1.6, 9.81, True)
 LEGS = 0.1
 RADIUS = 0.05
 

@@ -40,7 +40,7 @@ def test_termination_is_for_good() -> None:
 
 
 def test_a_vehicle_without_ground_is_in_the_air_when_armed() -> None:
-    profile = Profile("paper", 0, LocalOrigin(*ZURICH), 1.0, 1.981, False)
+    profile = Profile("paper", 0, LocalOrigin(*ZURICH), 1.0, 1.981, 9.81, False)
     view = dataclasses.replace(
         grounded_view(), position=(0.0, 0.0, 1.981), load_position=(0.0, 0.0, 0.0), cable_taut=True,
         vehicle_on_ground=False, load_on_ground=False,

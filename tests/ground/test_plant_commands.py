@@ -57,6 +57,23 @@ def test_the_plants_answer_is_the_answer(result: int, words: str) -> None:
     assert to_plant(rig) == []
 
 
+def test_a_late_answer_to_one_failure_is_not_taken_for_the_next_ones() -> None:
+    rig, client = rig_with_failures()
+    inject(client, *MOTOR_OFF)
+    to_plant(rig)
+    rig.run(1.5 * REPEAT)
+    assert len(to_plant(rig)) == 1  # sent twice, so answered twice
+    inject(client, 0.0, 1.0, 99.0)
+    plant_says(rig, 0)
+    (sent,) = to_plant(rig)
+    assert sent.param3 == 99.0
+    plant_says(rig, 0)  # late, to the first
+    rig.run(0.05)
+    plant_says(rig, 3)
+    rig.run(0.05)
+    assert [ack.result for ack in client.got("COMMAND_ACK")] == [0, 3]
+
+
 def test_it_is_sent_again_until_it_is_answered_and_the_client_may_ask_again() -> None:
     rig, client = rig_with_failures()
     inject(client, *MOTOR_OFF)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from sitl_bridge.compiled import kernel
+from sitl_bridge.frames import STANDARD_GRAVITY
 
 SEA_LEVEL_PRESSURE = 101325.0  # Pa
 SEA_LEVEL_TEMPERATURE = 288.15  # K
 LAPSE_RATE = 6.5e-3  # K/m
 GAS_CONSTANT = 287.05287  # J/(kg K), of dry air
-STANDARD_GRAVITY = 9.80665  # m/s²
 PRESSURE_EXPONENT = STANDARD_GRAVITY / (GAS_CONSTANT * LAPSE_RATE)
 ZERO_CELSIUS = 273.15  # K
 
