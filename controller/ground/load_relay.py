@@ -12,19 +12,12 @@ from controller.ground.peers import Address, Peer
 from controller.ground.view import Profile
 from controller.ground.wire import Packed, decoded, packed
 from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.mavlink.traffic import load_traffic
 
 LOAD_SILENCE = 2.0
 """s after which the load's last message is too old to be passed on"""
 _RATES = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0}
 """Hz, at most, at which the load's own messages are passed on"""
-_ADSB_FLAGS = (
-    mavlink.ADSB_FLAGS_VALID_COORDS
-    | mavlink.ADSB_FLAGS_VALID_ALTITUDE
-    | mavlink.ADSB_FLAGS_VALID_HEADING
-    | mavlink.ADSB_FLAGS_VALID_VELOCITY
-    | mavlink.ADSB_FLAGS_VALID_CALLSIGN
-    | mavlink.ADSB_FLAGS_SIMULATED
-)
 
 
 class LoadRelay:
@@ -64,20 +57,4 @@ class LoadRelay:
         if found is None or now - found[1] > LOAD_SILENCE:
             return None
         place = mavlink.MAVLink_global_position_int_message
-        _, lat, lon, alt, _, vx, vy, vz, _ = place.unpacker.unpack(found[0].payload)
-        course = math.degrees(math.atan2(vy, vx)) % 360
-        return mavlink.MAVLink_adsb_vehicle_message(
-            self._profile.load_system,
-            lat,
-            lon,
-            mavlink.ADSB_ALTITUDE_TYPE_GEOMETRIC,
-            alt,
-            int(course * 100) % 36000,
-            min(int(math.hypot(vx, vy)), 0xFFFF),
-            -vz if vz > -0x8000 else 0x7FFF,
-            f"LOAD{self._profile.instance}".encode(),
-            mavlink.ADSB_EMITTER_TYPE_LIGHTER_AIR,
-            1,
-            _ADSB_FLAGS,
-            0,
-        )
+        return load_traffic(self._profile.instance, place(*place.unpacker.unpack(found[0].payload)))

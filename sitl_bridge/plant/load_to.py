@@ -5,6 +5,7 @@ from __future__ import annotations
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
 from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.mavlink.traffic import load_traffic
 from sitl_bridge.plant.slow_frames import HEARTBEAT_INTERVAL, POSITION_INTERVAL, LoadOnMap, load_heartbeat
 from sitl_bridge.plant.state import Array
 
@@ -15,7 +16,8 @@ class LoadTo:
     """Datagrams for a ground station, at the pace of the wall clock, however simulated time runs."""
 
     def __init__(self, instance: int, origin: LocalOrigin) -> None:
-        self._map = LoadOnMap(instance, origin)
+        self._instance = instance
+        self._map = LoadOnMap(origin)
         self._load = Packer(load_system(instance), COMPONENT_LOAD)
         # QGroundControl takes traffic only from the vehicle's system.
         self._vehicle = Packer(vehicle_system(instance), COMPONENT_TRUTH)
@@ -27,8 +29,10 @@ class LoadTo:
         if now < self._next:
             return None
         self._next = now + POSITION_INTERVAL
-        out = self._load.pack(self._map.global_position(time_usec, x))
+        position = self._map.global_position(time_usec, x)
+        out = self._load.pack(position)
         if self._count % HEARTBEAT_EVERY == 0:
-            out = self._load.pack(load_heartbeat()) + out + self._vehicle.pack(self._map.traffic(x))
+            traffic = load_traffic(self._instance, position)
+            out = self._load.pack(load_heartbeat()) + out + self._vehicle.pack(traffic)
         self._count += 1
         return out

@@ -37,7 +37,7 @@ from sitl_bridge.mavlink.hil import (
     HIL_STATE_QUATERNION,
     ODOMETRY,
 )
-from sitl_bridge.plant.sensors.atmosphere import ZERO_CELSIUS
+from sitl_bridge.plant.sensors.atmosphere import GAS_CONSTANT, ZERO_CELSIUS, air_density
 from sitl_bridge.plant.sensors.gps import GpsFix
 from sitl_bridge.plant.sensors.instruments import MEASUREMENT
 from sitl_bridge.plant.state import STATE_SIZE, Array
@@ -64,8 +64,7 @@ _LOAD_AT = _VEHICLE_AT + _ODOMETRY_SIZE
 _STATE_AT = _LOAD_AT + _ODOMETRY_SIZE
 # `write_tick` is told what to send besides HIL_SENSOR, as bits.
 GPS, TRUTH, STATE = 1, 2, 4
-_SEA_LEVEL_DENSITY = 1.225  # kg/m³, International Standard Atmosphere
-_GAS_CONSTANT = 287.053  # J/(kg K), dry air
+_SEA_LEVEL_DENSITY = air_density(0.0)
 
 # Elements of the counters that `write_tick` keeps.
 VEHICLE_SEQUENCE, LOAD_SEQUENCE, VEHICLE_SYSTEM, LOAD_SYSTEM = range(4)
@@ -156,7 +155,7 @@ def fill_state(out: Any, x: Array, truth: Any, wind: Array, geodesy: Array) -> N
     out.vy = clipped(v[1] * CENTIMETRES_PER_METRE, -0x8000, 0x7FFF)
     out.vz = clipped(v[2] * CENTIMETRES_PER_METRE, -0x8000, 0x7FFF)
     through_air = math.sqrt((x[3] - wind[0]) ** 2 + (x[4] - wind[1]) ** 2 + (x[5] - wind[2]) ** 2)
-    density = truth.pressure / (_GAS_CONSTANT * (truth.temperature + ZERO_CELSIUS))
+    density = truth.pressure / (GAS_CONSTANT * (truth.temperature + ZERO_CELSIUS))
     indicated = through_air * math.sqrt(density / _SEA_LEVEL_DENSITY)
     out.true_airspeed = clipped(through_air * CENTIMETRES_PER_METRE, 0, 0xFFFF)
     out.ind_airspeed = clipped(indicated * CENTIMETRES_PER_METRE, 0, 0xFFFF)

@@ -95,7 +95,7 @@ class Simulation:
         """Reads what the autopilot says."""
         self._writer = TickWriter(instance, self.origin, self.world)
         self._slow = SlowFrames(
-            LoadOnMap(instance, self.origin),
+            LoadOnMap(self.origin),
             self._writer.load,
             self._writer.vehicle,
             vehicle.battery,

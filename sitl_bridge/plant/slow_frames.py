@@ -12,17 +12,14 @@ from typing import Any
 from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import (
-    CENTIDEGREES_PER_RADIAN,
     CENTIMETRES_PER_METRE,
     DEG_E7_PER_DEG,
     MICROSECONDS_PER_SECOND,
     MILLIMETRES_PER_METRE,
     LocalOrigin,
-    Triple,
     enu_to_ned,
     flu_to_frd,
 )
-from sitl_bridge.ids import load_system
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
 from sitl_bridge.plant.battery import BatteryReading
@@ -60,73 +57,25 @@ def load_heartbeat() -> Any:
 class LoadOnMap:
     """Where the load is, as messages for maps; state x (19,), world ENU, m and m/s."""
 
-    def __init__(self, instance: int, origin: LocalOrigin) -> None:
-        self._instance = instance
+    def __init__(self, origin: LocalOrigin) -> None:
         self._origin = origin
-
-    def _position(self, x: Array) -> tuple[int, int, int, int]:
-        east, north, up = x[LOAD_POSITION].tolist()
-        point = self._origin.geodetic((east, north, up))
-        return (
-            round(point.latitude * DEG_E7_PER_DEG),
-            round(point.longitude * DEG_E7_PER_DEG),
-            round(point.altitude * MILLIMETRES_PER_METRE),
-            round(up * MILLIMETRES_PER_METRE),
-        )
-
-    def _velocity(self, x: Array) -> Triple:
-        """North, east, down, cm/s."""
-        v_east, v_north, v_up = x[LOAD_VELOCITY].tolist()
-        north, east, down = enu_to_ned((v_east, v_north, v_up))
-        return (
-            CENTIMETRES_PER_METRE * north,
-            CENTIMETRES_PER_METRE * east,
-            CENTIMETRES_PER_METRE * down,
-        )
 
     def global_position(self, time_usec: int, x: Array) -> Any:
         """GLOBAL_POSITION_INT; a point has no heading."""
-        latitude, longitude, altitude, above_home = self._position(x)
-        north, east, down = (within(v, -0x8000, 0x7FFF) for v in self._velocity(x))
+        east, north, up = x[LOAD_POSITION].tolist()
+        point = self._origin.geodetic((east, north, up))
+        v_east, v_north, v_up = (CENTIMETRES_PER_METRE * v for v in x[LOAD_VELOCITY].tolist())
+        vx, vy, vz = (within(v, -0x8000, 0x7FFF) for v in enu_to_ned((v_east, v_north, v_up)))
         return common.MAVLink_global_position_int_message(
             time_boot_ms=(time_usec // 1000) & 0xFFFFFFFF,
-            lat=latitude,
-            lon=longitude,
-            alt=altitude,
-            relative_alt=above_home,
-            vx=north,
-            vy=east,
-            vz=down,
+            lat=round(point.latitude * DEG_E7_PER_DEG),
+            lon=round(point.longitude * DEG_E7_PER_DEG),
+            alt=round(point.altitude * MILLIMETRES_PER_METRE),
+            relative_alt=round(up * MILLIMETRES_PER_METRE),
+            vx=vx,
+            vy=vy,
+            vz=vz,
             hdg=NOT_KNOWN_UINT16,
-        )
-
-    def traffic(self, x: Array) -> Any:
-        """ADSB_VEHICLE."""
-        latitude, longitude, altitude, _ = self._position(x)
-        north, east, down = self._velocity(x)
-        flags = (
-            common.ADSB_FLAGS_VALID_COORDS
-            | common.ADSB_FLAGS_VALID_ALTITUDE
-            | common.ADSB_FLAGS_VALID_HEADING
-            | common.ADSB_FLAGS_VALID_VELOCITY
-            | common.ADSB_FLAGS_VALID_CALLSIGN
-            | common.ADSB_FLAGS_SIMULATED
-        )
-        course = math.atan2(east, north) % (2.0 * math.pi)
-        return common.MAVLink_adsb_vehicle_message(
-            ICAO_address=load_system(self._instance),
-            lat=latitude,
-            lon=longitude,
-            altitude_type=common.ADSB_ALTITUDE_TYPE_GEOMETRIC,
-            altitude=altitude,
-            heading=round(course * CENTIDEGREES_PER_RADIAN) % 36000,
-            hor_velocity=within(math.hypot(north, east), 0, 0xFFFF),
-            ver_velocity=within(-down, -0x8000, 0x7FFF),
-            callsign=f"LOAD{self._instance}".encode(),
-            emitter_type=common.ADSB_EMITTER_TYPE_LIGHTER_AIR,
-            tslc=0,
-            flags=flags,
-            squawk=0,
         )
 
 
