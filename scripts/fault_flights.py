@@ -20,6 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from controller.autopilot import Autopilot  # noqa: E402
+from controller.designs import ON_ESTIMATE  # noqa: E402
 from controller.estimate_feedback import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
 from controller.reference import setpoint  # noqa: E402
@@ -84,7 +85,7 @@ def fly(table: dict[str, list[dict[str, object]]]) -> NDArray[np.float64]:
     simulation = Simulation(vehicle, RATE, seed=0, duration_s=END, faults=faults)
     clock = Realtime(simulation, Notices(lambda text: None), 0)
     session = new_session(
-        lambda controls: Autopilot(vehicle, "default", RATE, lambda at: setpoint(at, at), controls),
+        lambda controls: Autopilot(vehicle, ON_ESTIMATE, RATE, lambda at: setpoint(at, at), controls),
         0,
         lambda text: None,
         EstimateFeedback(vehicle, RATE),
@@ -124,6 +125,8 @@ def main() -> None:
     print("| fault at 5 s | vehicle strays by, m | largest tilt, deg | 15 s later, m | outcome |")
     print("|---|---|---|---|---|")
     for name, table in FLIGHTS.items():
+        if len(sys.argv) > 1 and not any(word in name for word in sys.argv[1:]):
+            continue
         rows = fly(table)
         after = rows[rows[:, 0] >= AT]
         away = np.linalg.norm(after[:, 1:4] - rows[0, 1:4], axis=1)

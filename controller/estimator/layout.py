@@ -63,6 +63,8 @@ SENSORS = (
     "tracker",
 )
 SENSOR_COUNT = len(SENSORS)
+STALE_SENSORS = 3
+"""The first ones of these: noise is in every sample of theirs, and a repeated one is stuck."""
 
 # What holds the vehicle, and what the load does.
 ALIGNING, STANDING, FLYING = 0, 1, 2
@@ -161,8 +163,8 @@ MEMORY = np.dtype(
         ("hung", "f8", 2),
         ("hung_variance", "f8", 2),
         ("load_resets", "i8"),
-        ("stale_count", "i8"),
-        ("last_magnetometer", "f8", 3),
+        ("stale_count", "i8", STALE_SENSORS),
+        ("last_sample", "f8", (STALE_SENSORS, 3)),
         ("clone_width", "i8"),
         ("clone_time", "f8", CLONES),
         ("clone_kind", "i8", CLONES),
@@ -172,6 +174,7 @@ MEMORY = np.dtype(
         ("slip_until", "f8"),
         ("adrift", "b1"),
         ("height_suspicion", "f8"),  # running mean of normalised GPS height innovations
+        ("turn_suspicion", "f8", 3),  # the same of the gyroscope's
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
         ("normalised", "f8", (SENSOR_COUNT, 3)),

@@ -43,7 +43,9 @@ from sitl_bridge.compiled import kernel
 HEIGHT_STD = 0.3
 """m, of one look at the ground's height: taken at every tick, it is a soft hold and no new fact each time."""
 STALE_SAMPLES = 50
-"""So many identical samples, and a magnetometer counts as stuck: a live one has noise in every sample."""
+"""So many identical samples, and a sensor counts as stuck: a live one has noise in every sample."""
+STALE_INERTIAL_SAMPLES = 5
+"""The same in flight for accelerometer and gyroscope, on which the next samples of the flight depend."""
 
 
 @kernel
@@ -97,6 +99,26 @@ def ratio_of(f: Filter, sensor: int, axis: int, innovation: float, noise: float)
 
 
 @kernel
+def note_sample(f: Filter, sensor: int, measured: Any) -> bool:
+    """Compare a sample with the one before; whether the sensor is stuck."""
+    m, same = f.m, True
+    for axis in range(3):
+        if abs(measured[axis] - m.last_sample[sensor, axis]) > 1e-9 * abs(measured[axis]):
+            same = False
+        m.last_sample[sensor, axis] = measured[axis]
+    m.stale_count[sensor] = m.stale_count[sensor] + 1 if same else 0
+    return stuck(f, sensor)
+
+
+@kernel
+def stuck(f: Filter, sensor: int) -> bool:
+    """Whether a sensor repeats itself; inertial ones may do so at rest."""
+    if sensor == MAGNETOMETER:
+        return bool(f.m.stale_count[sensor] >= STALE_SAMPLES)
+    return bool(f.m.vehicle_mode == FLYING and f.m.stale_count[sensor] >= STALE_INERTIAL_SAMPLES)
+
+
+@kernel
 def saturated(f: Filter, specific_force: float) -> bool:
     """Whether an axis of the accelerometer is at its limit, where it says nothing but "much"."""
     return bool(abs(specific_force) >= 0.999 * f.p.accelerometer_range)
@@ -109,6 +131,9 @@ def accelerometer(f: Filter, measured: Any) -> None:
     Standing, it shows which way is up. Flying, it shows the cable, and so the load.
     """
     p, m = f.p, f.m
+    if note_sample(f, ACCELEROMETER, measured):
+        m.rejected[ACCELEROMETER] += 1
+        return
     noise = p.sensor_std[ACCELEROMETER] * p.sensor_std[ACCELEROMETER]
     if m.vehicle_mode == FLYING:
         noise += p.gust_std * p.gust_std
@@ -211,7 +236,8 @@ def gyroscope(f: Filter, measured: Any) -> None:
     """Body rates plus bias, rad/s."""
     p, m, x = f.p, f.m, f.x
     limit = p.gyroscope_range * 0.999
-    if abs(measured[0]) >= limit or abs(measured[1]) >= limit or abs(measured[2]) >= limit:
+    beyond = abs(measured[0]) >= limit or abs(measured[1]) >= limit or abs(measured[2]) >= limit
+    if note_sample(f, GYROSCOPE, measured) or beyond:
         m.rejected[GYROSCOPE] += 1
         return
     noise = p.sensor_std[GYROSCOPE] * p.sensor_std[GYROSCOPE]
@@ -221,18 +247,45 @@ def gyroscope(f: Filter, measured: Any) -> None:
         innovation = measured[axis] - x[X_RATES + axis] - x[X_GYRO_BIAS + axis]
         f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
         worst = max(worst, ratio_of(f, GYROSCOPE, axis, innovation, noise))
+    suspect_moments(f)
     # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
     # widens the rates, it does not refuse what the gyroscope sees for long.
     if not passes(f, GYROSCOPE, worst):
         if m.rejected_in_row[GYROSCOPE] < 3 or worst > 0.01 * GARBAGE:
             return
         for axis in range(3):
-            f.P[RATES + axis, RATES + axis] += m.innovation[GYROSCOPE, axis] ** 2
+            f.P[RATES + axis, RATES + axis] += (SUSPECTED_RATES * f.p.sensor_std[GYROSCOPE]) ** 2
     for axis in range(3):
         f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
         squares += fuse(f, m.innovation[GYROSCOPE, axis], noise)
     inject(f)
     book(f, GYROSCOPE, squares, 3)
+
+
+MOMENT_BLEND = 0.02
+MOMENT_LIMIT = 0.5
+"""Of the running mean of gyroscope innovations (50 samples), in standard deviations: 5 of its own."""
+SUSPECTED_RATES = 10.0
+"""The gyroscope's standard deviations: how wrong the rates then may be."""
+
+
+@kernel
+def suspect_moments(f: Filter) -> None:
+    """Rates that stay ahead of the model, or behind: a moment acts that the rotor commands do not explain.
+
+    A rotor is weaker than it was, or a load pulls off the centre. The gyroscope then counts for more.
+    """
+    m, cov, half = f.m, f.P, 0.5 * f.p.period
+    unknown = (SUSPECTED_RATES * f.p.sensor_std[GYROSCOPE]) ** 2
+    for axis in range(3):
+        m.turn_suspicion[axis] += MOMENT_BLEND * (m.normalised[GYROSCOPE, axis] - m.turn_suspicion[axis])
+        if abs(m.turn_suspicion[axis]) > MOMENT_LIMIT:
+            # What the moment gave the rates over the last tick, it gave the attitude half of, times the tick.
+            rate, angle = RATES + axis, ATTITUDE + axis
+            cov[rate, rate] += unknown
+            cov[rate, angle] += half * unknown
+            cov[angle, rate] += half * unknown
+            cov[angle, angle] += half * half * unknown
 
 
 @kernel
@@ -281,13 +334,7 @@ def magnetometer(f: Filter, measured: Any) -> None:
     A sample that repeats bit for bit is a stuck sensor.
     """
     p, m = f.p, f.m
-    same = True
-    for axis in range(3):
-        if abs(measured[axis] - m.last_magnetometer[axis]) > 1e-9 * abs(measured[axis]):
-            same = False
-        m.last_magnetometer[axis] = measured[axis]
-    m.stale_count = m.stale_count + 1 if same else 0
-    if m.stale_count >= STALE_SAMPLES:
+    if note_sample(f, MAGNETOMETER, measured):
         m.rejected[MAGNETOMETER] += 1
         return
     r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix(f.x)

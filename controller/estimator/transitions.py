@@ -29,7 +29,7 @@ from controller.estimator.layout import (
     X_VELOCITY,
     Filter,
 )
-from controller.estimator.sensors import measured_pull, saturated
+from controller.estimator.sensors import measured_pull, saturated, stuck
 from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
@@ -58,6 +58,10 @@ SET_DOWN_STD = 0.03
 """m: how far a load slides as it is set down, and how flat the ground is."""
 KNOWN = 0.2
 """Of the cable's length: a load whose place is known better is not looked for anew."""
+DOUBT = 0.1
+"""Of the cable's length: how far a load may be from where it is thought, when forces do not fit."""
+DOUBTED_SPEED = 0.5
+"""m/s, likewise"""
 STRETCH_STD = 0.02
 """Of the cable's length: how well a pull shows how long the cable is."""
 
@@ -68,7 +72,7 @@ def watch(f: Filter, measured: Any) -> None:
     p, m, x = f.p, f.m, f.x
     if m.vehicle_mode == STANDING and m.grounded and m.thrust > p.vehicle_mass * p.gravity:
         leave_ground(f)
-    if m.vehicle_mode != FLYING:
+    if m.vehicle_mode != FLYING or stuck(f, ACCELEROMETER):
         return
     for axis in range(3):
         if saturated(f, measured[axis]):
@@ -93,8 +97,7 @@ def watch(f: Filter, measured: Any) -> None:
     if m.rejected_in_row[ACCELEROMETER] * p.period > CONFIRM_TIME:
         # The accelerometer and the model have parted: where the load is has to be found again.
         m.rejected_in_row[ACCELEROMETER] = 0
-        if m.load_mode == LOAD_ON_CABLE:
-            place_load(f, pull)
+        doubt(f)
     # What smoothing leaves of noise and unmodelled force, three standard deviations.
     noise = math.sqrt(p.sensor_std[ACCELEROMETER] ** 2 + p.force_std**2)
     floor = 3.0 * p.vehicle_mass * noise * math.sqrt(blend)
@@ -257,6 +260,24 @@ def bump(f: Filter) -> None:
         f.P[LOAD_VELOCITY + axis, LOAD_VELOCITY + axis] += change
         f.P[VELOCITY + axis, LOAD_VELOCITY + axis] -= change
         f.P[LOAD_VELOCITY + axis, VELOCITY + axis] -= change
+
+
+@kernel
+def doubt(f: Filter) -> None:
+    """The accelerometer and the model have parted: a force acts that is not known, or the load is elsewhere.
+
+    Which of them the next samples show; a load that was put where everything that pulls points would be
+    metres off whenever it was the wind, or a rotor that is weaker than its command.
+    """
+    m, p, cov = f.m, f.p, f.P
+    squares = 0.0
+    for axis in range(3):
+        squares += m.innovation[ACCELEROMETER, axis] ** 2
+    for axis in range(3):
+        cov[FORCE + axis, FORCE + axis] += squares
+        if m.load_mode == LOAD_ON_CABLE:
+            cov[LOAD + axis, LOAD + axis] += (DOUBT * p.rest_length) ** 2
+            cov[LOAD_VELOCITY + axis, LOAD_VELOCITY + axis] += DOUBTED_SPEED**2
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -135,3 +136,31 @@ def test_pick_up_and_set_down_leave_no_false_certainty(name: str, preset: str, s
     assert np.abs(landing[:, 2]).max() < 0.25  # a touch-down is no reason to lose the height
     assert normalised() < chi2.ppf(0.997, 2) / 2.0
     assert abs(off()[0][2]) < 0.05
+
+
+FAULT_AT = 30.0
+"""s after arming: the vehicle holds at 5 m by then"""
+
+
+@pytest.mark.parametrize(
+    ("faults", "said"),
+    [
+        ({"sensor": [{"sensor": "accelerometer", "failure": "stuck", "at": FAULT_AT}]}, "Accelerometer lost"),
+        ({"sensor": [{"sensor": "gyroscope", "failure": "stuck", "at": FAULT_AT}]}, "Gyroscope lost"),
+        ({"rotor": [{"rotor": 1, "thrust": 0.7, "at": FAULT_AT}]}, ""),
+        ({"rotor": [{"rotor": 1, "thrust": 0.0, "at": FAULT_AT, "duration": 0.1}]}, ""),
+    ],
+    ids=["accelerometer", "gyroscope", "weak rotor", "rotor off for a moment"],
+)
+def test_hold_outlives_what_the_model_can_bridge(faults: dict[str, Any], said: str) -> None:
+    """A stuck inertial sensor is found out and done without; moments nobody commanded are followed."""
+    flight = GuidedFlight(load_vehicle("iris"), 2, faults)
+    flight.arm_and_take_off(5.0)
+    began = flight.now
+    place, _ = flight.truth()
+    flight.wait(FAULT_AT - began + 15.0)
+    assert flight.machine.flying
+    assert any(said in text for text in flight.said)
+    later = [state[:3] for now, state, _ in flight.rows if now > FAULT_AT + 2.0]
+    assert np.linalg.norm(np.array(later) - place, axis=1).max() < 1.5
+    assert np.abs(flight.errors()[-1]).max() < 0.6

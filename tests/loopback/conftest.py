@@ -105,10 +105,12 @@ def port() -> int:
 
 @pytest.fixture
 def fly(start: Callable[..., Process], tmp_path: Path) -> Callable[..., dict[str, Any]]:
-    """Fly a scenario to its end; its summary."""
+    """Fly a scenario to its end; its summary. `expect`: the exit code, None: as the summary has `settled`."""
     flights = iter(range(1000))
 
-    def run(scenario: str, *arguments: str, clock: str = "lockstep", expect: int = 0) -> dict[str, Any]:
+    def run(
+        scenario: str, *arguments: str, clock: str = "lockstep", expect: int | None = 0
+    ) -> dict[str, Any]:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.bind(("127.0.0.1", 0))
             free = probe.getsockname()[1]
@@ -118,8 +120,10 @@ def fly(start: Callable[..., Process], tmp_path: Path) -> Callable[..., dict[str
             *("--hil", f"udpout:127.0.0.1:{free}"),
             *arguments,
         ).finish()
-        assert code == expect, errors
+        assert code in (0, 1), errors
+        assert output, errors
         summary: dict[str, Any] = json.loads(output)  # nothing else on standard output
+        assert code == (expect if expect is not None else 0 if summary["settled"] else 1), errors
         assert summary == json.loads((out / "summary.json").read_text())
         return summary
 
