@@ -107,8 +107,8 @@ class Guidance:
         self.home, self._home_load = view.position, view.load_position
 
     def set_home_below(self, view: VehicleView) -> None:
-        """Home is on the ground, where the world's origin is, under a vehicle that was found in the air."""
-        self.home = self._home_load = (view.position[0], view.position[1], 0.0)
+        """Home is on the ground under a vehicle that was found in the air."""
+        self.home = self._home_load = (view.position[0], view.position[1], self._profile.ground_height)
 
     def begin(self, view: VehicleView) -> None:
         """Armed: on the ground, or in the air already."""

@@ -58,6 +58,10 @@ _BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
 _FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
+_CELLS, _FURTHER_CELLS = 10, 4
+"""Fields of BATTERY_STATUS.voltages and .voltages_ext"""
+_NO_CELL = 0xFFFF
+
 Builder = Callable[[Machine, VehicleView], Any]
 
 
@@ -214,11 +218,23 @@ def _altitude(machine: Machine, view: VehicleView) -> Any:
     )
 
 
+def cell_voltages(pack: float, cells: int) -> tuple[list[int], list[int]]:
+    """BATTERY_STATUS.voltages and .voltages_ext, mV, of a pack (V, NaN: not known) that is shared evenly."""
+    if not math.isfinite(pack):
+        return [_NO_CELL] * _CELLS, [0] * _FURTHER_CELLS
+    if cells <= _CELLS + _FURTHER_CELLS:
+        each = whole(1000 * pack / cells, 16, signed=False)
+        first, further = ([each] * cells)[:_CELLS], ([each] * cells)[_CELLS:]
+        no_cells, no_further = [_NO_CELL] * (_CELLS - len(first)), [0] * (_FURTHER_CELLS - len(further))
+        return first + no_cells, further + no_further
+    # More than there is room for: the whole pack's, over as many fields as it fills, as the standard says.
+    left = max(0, round(1000 * pack))
+    fields = [min(_NO_CELL - 1, max(0, left - i * (_NO_CELL - 1))) for i in range(_CELLS)]
+    return [fields[0], *(field or _NO_CELL for field in fields[1:])], [0] * _FURTHER_CELLS
+
+
 def _battery_status(machine: Machine, view: VehicleView) -> Any:
-    cells = min(machine.parameters.integer("BAT1_N_CELLS"), 10)
-    known = math.isfinite(view.battery_voltage)
-    each = whole(1000 * view.battery_voltage / cells, 16, signed=False) if known else 0xFFFF
-    voltages = [each] * cells + [0xFFFF] * (10 - cells)
+    voltages, further = cell_voltages(view.battery_voltage, machine.parameters.integer("BAT1_N_CELLS"))
     return mavlink.MAVLink_battery_status_message(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
@@ -231,6 +247,7 @@ def _battery_status(machine: Machine, view: VehicleView) -> Any:
         whole(100 * view.battery_remaining, 8, unknown=-1),
         0,
         _charge_state(machine, view),
+        further,
     )
 
 

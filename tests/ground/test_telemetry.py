@@ -9,8 +9,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.streams import STREAMABLE
-from controller.ground.telemetry import CAPABILITIES, whole
-from controller.ground.view import Gps
+from controller.ground.telemetry import CAPABILITIES, cell_voltages, whole
+from controller.ground.view import Gps, profile_of
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.kinematic import ZURICH, grounded_view
 from tests.ground.rig import Client, Rig
@@ -87,6 +88,38 @@ def test_battery_and_status() -> None:
     _, client = seen(battery_voltage=math.nan, battery_current=math.nan, battery_remaining=math.nan)
     status = client.got("SYS_STATUS")[0]
     assert (status.voltage_battery, status.current_battery, status.battery_remaining) == (0xFFFF, -1, -1)
+
+
+@pytest.mark.parametrize(
+    ("cells", "volts", "voltages", "further"),
+    [
+        (3, 11.4, [3800] * 3 + [0xFFFF] * 7, [0] * 4),
+        (10, 38.0, [3800] * 10, [0] * 4),
+        (12, 45.6, [3800] * 10, [3800] * 2 + [0] * 2),
+        (14, 53.2, [3800] * 10, [3800] * 4),
+        (20, 76.0, [65534, 10466] + [0xFFFF] * 8, [0] * 4),  # no room for 20 cells: the pack's voltage
+        (20, 50.0, [50000] + [0xFFFF] * 9, [0] * 4),
+        (12, math.nan, [0xFFFF] * 10, [0] * 4),
+    ],
+)
+def test_voltages_of_cells(cells: int, volts: float, voltages: list[int], further: list[int]) -> None:
+    assert cell_voltages(volts, cells) == (voltages, further)
+
+
+@pytest.mark.parametrize(("name", "cells"), [("iris", 3), ("heavy", 12), ("paper", 4)])
+def test_the_battery_has_the_vehicles_cells(name: str, cells: int) -> None:
+    rig = Rig(profile_of(load_vehicle(name)))
+    client = rig.client()
+    parameters = rig.station.parameters
+    assert parameters.integer("BAT1_N_CELLS") == cells
+    rig.view.battery_voltage = 3.7 * cells
+    rig.run(3.0)
+    battery = client.got("BATTERY_STATUS")[-1]
+    shown = [*battery.voltages, *battery.voltages_ext]
+    assert [volts for volts in shown if volts not in (0, 0xFFFF)] == [3700] * cells
+    assert parameters.set("BAT1_N_CELLS", 6) == ""
+    parameters.reset()
+    assert parameters.integer("BAT1_N_CELLS") == cells
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e300, -1e9])
