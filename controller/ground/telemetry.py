@@ -138,19 +138,17 @@ def _global_position(machine: Machine, view: VehicleView) -> Any:
 
 def _gps_raw(machine: Machine, view: VehicleView) -> Any:
     gps = view.gps
-    velocity = view.velocity if gps.velocity is None else gps.velocity
-    place = _place(machine, view.position) if gps.position is None else _wire_place(gps.position)
-    speed = math.hypot(velocity[0], velocity[1])
-    course = heading_from_yaw(math.atan2(velocity[1], velocity[0])) % (2 * math.pi)
+    east, north, _ = gps.velocity
+    course = heading_from_yaw(math.atan2(north, east)) % (2 * math.pi) * CENTIDEGREES_PER_RADIAN
     return mavlink.MAVLink_gps_raw_int_message(
         _microseconds(view),
         gps.fix_type,
-        *place,
+        *((0, 0, 0) if gps.position is None else _wire_place(gps.position)),
         # Dilution of precision times 100: of receivers with 1 m at a dilution of 1.
         whole(gps.horizontal_accuracy * 100, 16, signed=False, unknown=0xFFFF),
         whole(gps.vertical_accuracy * 100, 16, signed=False, unknown=0xFFFF),
-        whole(speed * CENTIMETRES_PER_METRE, 16, signed=False, unknown=0xFFFF),
-        whole(course * CENTIDEGREES_PER_RADIAN, 16, signed=False, unknown=0xFFFF) % 36000,
+        whole(math.hypot(east, north) * CENTIMETRES_PER_METRE, 16, signed=False, unknown=0xFFFF),
+        0xFFFF if math.isnan(course) else whole(course, 16, signed=False) % 36000,
         gps.satellites,
         h_acc=whole(gps.horizontal_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
         v_acc=whole(gps.vertical_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
@@ -186,7 +184,7 @@ def _sys_status(machine: Machine, view: VehicleView) -> Any:
         present,
         present,
         healthy,
-        whole(1000 * view.load_share, 16, signed=False),
+        0,  # load: in lockstep the loop's share of the processor says nothing about the vehicle
         whole(1000 * view.battery_voltage, 16, signed=False, unknown=0xFFFF),
         whole(100 * view.battery_current, 16, unknown=-1),
         whole(100 * view.battery_remaining, 8, unknown=-1),
@@ -355,7 +353,7 @@ def _estimator_status(machine: Machine, view: VehicleView) -> Any:
     if health.position:
         flags |= mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_VERT_ABS
     ratios = (0.0,) * 6
-    accuracy = (view.gps.horizontal_accuracy, view.gps.vertical_accuracy)
+    accuracy = (0.0, 0.0)  # of the truth
     if quality is not None:
         flags |= mavlink.ESTIMATOR_CONST_POS_MODE * quality.dead_reckoning
         flags |= mavlink.ESTIMATOR_GPS_GLITCH * quality.gps_glitch

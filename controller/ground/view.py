@@ -73,18 +73,20 @@ class Health:
 
 @dataclass(slots=True)
 class Gps:
-    """The last fix of the receiver."""
+    """What the receiver says; without a fix, next to nothing."""
 
-    fix_type: int = 3
-    satellites: int = 10
-    horizontal_accuracy: float = 1.0
+    fix_type: int = 0
+    """GPS_FIX_TYPE: 0 no receiver, 1 no fix, 3 a fix in three dimensions"""
+    satellites: int = 255
+    """255: not known"""
+    horizontal_accuracy: float = math.nan
     """m"""
-    vertical_accuracy: float = 1.5
+    vertical_accuracy: float = math.nan
     """m"""
     position: Geodetic | None = None
-    """None: as the estimate has it."""
-    velocity: Triple | None = None
-    """m/s, ENU. None: as the estimate has it."""
+    """Of the last fix; None: there was none."""
+    velocity: Triple = (math.nan, math.nan, math.nan)
+    """m/s, ENU"""
 
 
 @dataclass(slots=True)
@@ -143,8 +145,6 @@ class VehicleView:
     gps: Gps = field(default_factory=Gps)
     quality: EstimateQuality | None = None
     """None: the feedback is the truth"""
-    load_share: float = 0.0
-    """share of the loop's period that its work takes, 0..1"""
 
     @property
     def in_reach(self) -> bool:
