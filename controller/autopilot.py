@@ -9,6 +9,7 @@ import numpy as np
 from controller.allocation import allocation
 from controller.designs import design
 from controller.feedback import PathFrom
+from controller.hil.ticks import TickReader
 from controller.law import WORK, Law, engaged_memory
 from controller.state import LOAD_POSITION, Array
 from controller.step import control_step
@@ -30,6 +31,9 @@ class Autopilot:
         self._design = design(design_name, vehicle, rate_hz)
         self._allocation = allocation(vehicle)
         self._step: Callable[[], int] | None = None
+
+    def attend(self, reader: TickReader) -> None:
+        """The estimate is all that the law needs."""
 
     def disarm(self) -> None:
         """Stop the rotors; the next step arms and starts afresh."""

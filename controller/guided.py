@@ -21,6 +21,8 @@ from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Te
 from controller.ground.verdict import INFO, WARNING, Notice
 from controller.ground.view import VehicleView
 from controller.ground.wire import decoded
+from controller.guided_receiver import Receiver
+from controller.hil.ticks import TickReader
 from controller.law import WORK, Design, Memory, engaged_memory
 from controller.state import (
     EULER_ANGLES,
@@ -34,12 +36,13 @@ from controller.step import control_step
 from controller.trajectory import Limits, Trajectory
 from sitl_bridge.frames import Triple, quaternion_from_euler
 from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.mavlink.hil import HIL_GPS
 from sitl_bridge.vehicle import Vehicle
 
 IDLE_COMMAND = 0.08
 """Rotors of a vehicle that is armed on the ground, as a share of their largest speed."""
 ASSESSMENT_PERIOD = 0.1
-"""s of the plant's time between two looks at the health of the feedback."""
+"""s of the plant's time between two looks at the health of the feedback and at the GPS receiver."""
 REACH = 0.3
 """m, beyond a hanging load's distance, to which the vehicle pulls to lift the load off."""
 PICK_UP_SPEED = 0.4
@@ -113,6 +116,8 @@ class GuidedAutopilot:
         """A target for the load, and what the vehicle does for it while the load lies"""
         self._view: VehicleView | None = None
         self._heard = -math.inf
+        self._accelerometer: Array = np.zeros(3)
+        self._receiver = Receiver(HIL_GPS.record()[0][0], vehicle.sensors.gps.rate)
 
     law = None
     """Ground control may want something else at any step."""
@@ -121,6 +126,11 @@ class GuidedAutopilot:
     def armed(self) -> bool:
         """Whether the rotors turn."""
         return self.station.armed
+
+    def attend(self, reader: TickReader) -> None:
+        """Ground control is shown what accelerometer and GPS receiver say."""
+        self._accelerometer = reader.sensed["accelerometer"][0]
+        self._receiver = Receiver(reader.gps, self._vehicle.sensors.gps.rate)
 
     def disarm(self) -> None:
         """The plant has started again, or says no more where the vehicle is."""
@@ -172,6 +182,7 @@ class GuidedAutopilot:
         view.position, view.load_position = position, load
         view.velocity, view.load_velocity = (x[6], x[7], x[8]), (x[9], x[10], x[11])
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
+        view.acceleration = tuple(self._accelerometer.tolist())
         contact = self._assessor.contact(estimate)
         if view.load_attached and not contact.load_attached:  # for good: it may well lie within reach again
             view.load_attached = False
@@ -180,6 +191,7 @@ class GuidedAutopilot:
         view.cable_taut = contact.cable_taut
         if first or view.time >= self._next_assessment:
             self._next_assessment = view.time + ASSESSMENT_PERIOD
+            view.gps = self._receiver.look(view.time)
             for text in self._assessor.assess(view):
                 self.station.announce(Notice(WARNING, text), now)
         view.hil_age = 0.0

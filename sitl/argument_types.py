@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from controller.ground.ports import STATION_LOCAL, STATION_PEER
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def host_and_port(text: str) -> tuple[str, int]:
     """An argument type: HOST:PORT."""
     host, _, port = text.rpartition(":")
     if not host or not port.isdigit() or not 0 < int(port) <= 65535:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, as in 127.0.0.1:14550")
+        raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, as in 127.0.0.1:{STATION_PEER}")
     return host, int(port)
 
 
@@ -65,5 +66,6 @@ def ports(text: str) -> Ports:
     local, colon, peer = text.partition(":")
     numbers = [int(part) for part in (local, peer) if part.isdigit() and 0 < int(part) < 65536]
     if not colon or len(numbers) != 2:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected two UDP ports LOCAL:PEER, as in 18570:14550")
+        example = f"{STATION_LOCAL}:{STATION_PEER}"
+        raise argparse.ArgumentTypeError(f"{text!r}: expected two UDP ports LOCAL:PEER, as in {example}")
     return Ports(*numbers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from controller.ground.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from sitl.argument_types import host_and_port, link_address, number, ports, whole
 from sitl_bridge.description import preset_names, vehicle_names
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
@@ -209,8 +210,8 @@ def _control(parser: argparse.ArgumentParser) -> None:
 def _ground(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("ground control", "with a scenario that leaves the flight to it (hold)")
     for flag, whom, local, peer in (
-        ("--gcs", "ground stations", "18570+N", "14550"),
-        ("--onboard", "MAVSDK and companion computers", "14580+N", "14540+N"),
+        ("--gcs", "ground stations", f"{STATION_LOCAL}+N", f"{STATION_PEER}"),
+        ("--onboard", "MAVSDK and companion computers", f"{ONBOARD_LOCAL}+N", f"{ONBOARD_PEER}+N"),
     ):
         group.add_argument(
             flag,

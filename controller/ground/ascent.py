@@ -28,6 +28,8 @@ class Step(Enum):
     """Up until the cable is taut."""
     CARRY = auto()
     """Up with the load, the load controlled."""
+    ALONE = auto()
+    """Straight up without a load: it was lost."""
     DONE = auto()
 
 
@@ -42,7 +44,7 @@ class Ascent:
         self._yaw = euler_from_quaternion(view.attitude)[2]
         self._target = self._lift(view)
         if not view.load_attached:
-            self._target = self._vehicle((view.position[0], view.position[1], height))
+            self._go_alone(view)
         elif view.cable_taut and not view.load_on_ground:
             self._carry(view)
 
@@ -53,9 +55,10 @@ class Ascent:
 
     def target(self, view: VehicleView) -> Goto:
         """Where to go now; moves on to the next step when this one is done."""
-        if not view.load_attached:
-            if self._arrived(view) or view.position[2] >= self.height - _NEAR:
-                self.step = Step.DONE
+        if not view.load_attached and self.step not in (Step.ALONE, Step.DONE):
+            self._go_alone(view)
+        elif self.step is Step.ALONE and view.position[2] >= self.height - _NEAR:
+            self.step = Step.DONE
         elif self.step is Step.LIFT and self._arrived(view):
             self.step = Step.OVER
             load = view.load_position
@@ -86,6 +89,10 @@ class Ascent:
         here = view.load_position
         height = self.height - self._profile.hover_length
         self._target = Goto(Body.LOAD, (here[0], here[1], height), self._yaw, self._speed)
+
+    def _go_alone(self, view: VehicleView) -> None:
+        self.step = Step.ALONE
+        self._target = self._vehicle((view.position[0], view.position[1], self.height))
 
     def _vehicle(self, position: Triple, speed: float | None = None) -> Goto:
         return Goto(Body.VEHICLE, position, self._yaw, speed or self._speed)

@@ -49,12 +49,10 @@ class Descent:
         self._place = place
         self._ground = ground
         self._speed = speed
-        self._fast = fast
         self._reach = min(beside, _BESIDE * profile.rest_length)
         self._profile = profile
         self._stand = stand
         self._yaw = euler_from_quaternion(view.attitude)[2]
-        self._contact_since: float | None = None
         low = (place[0], place[1], min(view.load_position[2], ground + _LOW))
         self._target: Goto | Land = Goto(Body.LOAD, low, self._yaw, fast)
         if not view.load_attached:

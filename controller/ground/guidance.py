@@ -18,6 +18,7 @@ from controller.ground.fence import Fence, fence_around
 from controller.ground.mission_flight import MissionFlight, Then
 from controller.ground.parameters import Parameters
 from controller.ground.points import (
+    above,
     below,
     controlled_body,
     hanging_under,
@@ -82,7 +83,8 @@ class Guidance:
         self._descent: Descent | None = None
         self._return: ReturnHome | None = None
         self._point: Triple = (0.0, 0.0, 0.0)
-        """m, of the controlled body in HOLD and while waiting"""
+        """m, of `_point_of` in HOLD and while waiting"""
+        self._point_of = Body.LOAD
         self._yaw = 0.0
 
     # Where it begins
@@ -105,8 +107,8 @@ class Guidance:
         self.home, self._home_load = view.position, view.load_position
 
     def set_home_below(self, view: VehicleView) -> None:
-        """Home is on the ground, where the world's origin is, under a vehicle that was found in the air."""
-        self.home = self._home_load = (view.position[0], view.position[1], 0.0)
+        """Home is on the ground under a vehicle that was found in the air."""
+        self.home = self._home_load = (view.position[0], view.position[1], self._profile.ground_height)
 
     def begin(self, view: VehicleView) -> None:
         """Armed: on the ground, or in the air already."""
@@ -130,14 +132,14 @@ class Guidance:
 
     def hold_here(self, view: VehicleView) -> None:
         """Come to rest, and stay."""
-        self._point = stopping_point(view, self._parameters)
+        self._stay_at(stopping_point(view, self._parameters), controlled_body(view))
         self._yaw = euler_from_quaternion(view.attitude)[2]
         self.speed = math.nan
 
     def go_to(self, vehicle: Triple | None, yaw: float, speed: float, view: VehicleView) -> None:
         """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is."""
         if vehicle is not None:
-            self._point = self._controlled(vehicle, view)
+            self._stay_at(self._controlled(vehicle, view), controlled_body(view))
         self._yaw = self._yaw if math.isnan(yaw) else yaw
         self.speed = speed
 
@@ -177,6 +179,8 @@ class Guidance:
 
     def target(self, view: VehicleView, setpoint: Setpoint | None, last: Target) -> Target:
         """Off the ground: what to do now. `setpoint`: the offboard client's; `last`: the target before."""
+        if self._point_of is Body.LOAD and not view.load_attached:
+            self._go_on_without_load()
         if self.stage is Stage.ASCENT and self._ascent is not None:
             target = self._ascent.target(view)
             self._after_ascent(self._ascent, view)
@@ -194,7 +198,11 @@ class Guidance:
         ):
             self.stage = Stage.FLYING
             self._ascent = None
-            self._point = ascent.target(view).position if done else stopping_point(view, self._parameters)
+            reached = ascent.target(view)
+            if done:
+                self._stay_at(reached.position, reached.body)
+            else:
+                self._stay_at(stopping_point(view, self._parameters), controlled_body(view))
             if mode is Mode.TAKEOFF:
                 self._pilot.set_mode_to(Mode.HOLD)
             self.start(self._pilot.mode)
@@ -236,7 +244,16 @@ class Guidance:
 
     def _hold(self, view: VehicleView) -> Goto:
         speed = limited_speed(self.speed, self._parameters)
-        return Goto(controlled_body(view), self._point, self._yaw, speed)
+        return Goto(self._point_of, self._point, self._yaw, speed)
+
+    def _stay_at(self, point: Triple, body: Body) -> None:
+        self._point, self._point_of = point, body
+
+    def _go_on_without_load(self) -> None:
+        """The vehicle's point is where it hovered above the load's; it would fall there otherwise."""
+        self._stay_at(above(self._point, self._profile.hover_length), Body.VEHICLE)
+        if self._return is not None:
+            self._return.without_load(self._profile.hover_length)
 
     def _controlled(self, vehicle: Triple, view: VehicleView) -> Triple:
         """The controlled body's point for a vehicle's point."""
@@ -248,7 +265,7 @@ class Guidance:
             self._return = ReturnHome(self.home_or_origin, self._home_load, self._point)
         if self._return.arrived(view, self._parameters, self._profile):
             self._land(view, self._return.place(view), self.home_or_origin)
-        self._point = self._return.point
+        self._stay_at(self._return.point, controlled_body(view))
         return self._hold(view)
 
     def _land(self, view: VehicleView, place: Triple, stand: Triple | None = None) -> None:
@@ -298,14 +315,15 @@ class Guidance:
 
     def _follow(self, asked: Setpoint, view: VehicleView) -> Target:
         position, velocity = asked.position, limited_velocity(asked.velocity, self._parameters)
-        if view.load_attached and not asked.of_load:
+        if view.load_attached is not asked.of_load:  # a lost load's: from above where it would be
             under = hanging_under(asked.acceleration, self._profile)
-            x, y, z = (p - d for p, d in zip(position, under, strict=True))
+            way = -1.0 if view.load_attached else 1.0
+            x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
             position = (x, y, z)
         plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
         self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
         body = controlled_body(view)
         if plain:
-            self._point = position
+            self._stay_at(position, body)
             return Goto(body, position, self._yaw, self._parameters["MPC_XY_VEL_MAX"])
         return Follow(body, position, velocity, asked.acceleration, asked.yaw, asked.yaw_rate)

@@ -17,11 +17,11 @@ from controller.ground.parameters import Parameters
 from controller.ground.peers import Peer
 from controller.ground.setpoints import setpoint_of
 from controller.ground.verdict import WARNING, Notice
-from controller.ground.view import LOAD_COMPONENT, VEHICLE_COMPONENT
 from controller.ground.wire import Packed
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
 
-_MISSION_COMPONENTS = (0, VEHICLE_COMPONENT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
+_MISSION_COMPONENTS = (0, COMPONENT_AUTOPILOT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 _BROADCAST = 0
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
@@ -61,7 +61,7 @@ class Inbox:
         elif number in _NOT_FLOWN:
             self._out.say_seldom(peer, _NOT_FLOWN[number], now)
 
-    def _addressed(self, message: Any, components: tuple[int, ...] = (0, VEHICLE_COMPONENT)) -> bool:
+    def _addressed(self, message: Any, components: tuple[int, ...] = (0, COMPONENT_AUTOPILOT)) -> bool:
         """Whether a message is for the vehicle."""
         return (
             message.target_system in (_BROADCAST, self._profile.system)
@@ -71,7 +71,7 @@ class Inbox:
     def _to_load(self, message: Any) -> bool:
         return message.target_system == self._profile.load_system and message.target_component in (
             0,
-            LOAD_COMPONENT,
+            COMPONENT_LOAD,
         )
 
     def _command(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:

@@ -16,7 +16,7 @@ from controller.ground.guidance import Guidance, Stage
 from controller.ground.mission_flight import MissionFlight
 from controller.ground.parameters import Parameters
 from controller.ground.plan import Fault, Item
-from controller.ground.points import above, filled, limited_speed
+from controller.ground.points import above, filled, hanging_load, limited_speed
 from controller.ground.preconditions import arming_faults
 from controller.ground.px4_modes import Mode
 from controller.ground.setpoints import Offboard, Setpoint
@@ -190,7 +190,7 @@ class Machine:
             )
         if any(math.isinf(x) for x in (*where.position, where.yaw)):
             return deny("Going there refused: position or heading is infinite")
-        here = view.load_position if where.of_load else view.position
+        here = hanging_load(view, self.profile) if where.of_load else view.position
         vehicle = self._vehicle_point(filled(where.position, here), where.of_load)
         stays = all(math.isnan(x) for x in where.position)
         fault = "" if stays or self.fence is None else self.fence.refuses(vehicle)
@@ -216,7 +216,7 @@ class Machine:
         fence = self.fence
         if fence is None or self.view is None:
             return "Set-point refused: no position yet; start the plant"
-        here = self.view.load_position if setpoint.of_load else self.view.position
+        here = hanging_load(self.view, self.profile) if setpoint.of_load else self.view.position
         point = self._vehicle_point(filled(setpoint.position, here), setpoint.of_load)
         asked = any(not math.isnan(x) for x in setpoint.position)
         low = not math.isnan(setpoint.position[2])

@@ -9,8 +9,9 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.peers import Peer, Peers
 from controller.ground.signing import Signing
 from controller.ground.verdict import WARNING, Notice
-from controller.ground.view import LOAD_COMPONENT, VEHICLE_COMPONENT, Profile
+from controller.ground.view import Profile
 from controller.ground.wire import packed
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 
 TEXT_LENGTH = 50
 """Characters of one STATUSTEXT; longer texts go in pieces"""
@@ -24,8 +25,8 @@ class Outbox:
     """Fills the queues of peers."""
 
     def __init__(self, peers: Peers, profile: Profile, signing: Signing | None) -> None:
-        self.vehicle = (profile.system, VEHICLE_COMPONENT)
-        self.load = (profile.load_system, LOAD_COMPONENT)
+        self.vehicle = (profile.system, COMPONENT_AUTOPILOT)
+        self.load = (profile.load_system, COMPONENT_LOAD)
         self._peers = peers
         self._signing = signing
 

@@ -48,9 +48,9 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("CAL_ACC0_ID", 1310988, 1, 2147483647, "", "Accelerometer that is calibrated (not 0); no effect"),
     Parameter("CAL_MAG0_ID", 197388, 1, 2147483647, "", "Magnetometer that is calibrated (not 0); no effect"),
     Parameter("SYS_FAILURE_EN", 0, 0, 1, "", "Whether MAV_CMD_INJECT_FAILURE is passed on to the plant", ((0, "refused"), (1, "passed on"))),
-    Parameter("BAT1_N_CELLS", 4, 1, 24, "", "Cells in series; shown in BATTERY_STATUS"),
-    Parameter("BAT1_V_CHARGED", 4.05, 3.0, 4.5, "V", "Voltage of a full cell"),
-    Parameter("BAT1_V_EMPTY", 3.6, 2.5, 4.0, "V", "Voltage of an empty cell under load"),
+    Parameter("BAT1_N_CELLS", 4, 1, 100, "", "Cells in series, by default the vehicle's if it has a battery; BATTERY_STATUS shares the voltage among them"),
+    Parameter("BAT1_V_CHARGED", 4.05, 3.0, 4.5, "V", "Voltage of a full cell; no effect, read by ground stations"),
+    Parameter("BAT1_V_EMPTY", 3.6, 2.5, 4.0, "V", "Voltage of an empty cell under load; no effect, read by ground stations"),
     # Take-off, flight, landing
     Parameter("MIS_TAKEOFF_ALT", 2.5, 0.5, 80.0, "m", "Height of the vehicle above home after take-off; more where the load would not leave the ground"),
     Parameter("MPC_TKO_SPEED", 1.0, 0.2, 5.0, "m/s", "Climb rate of a take-off"),

@@ -29,8 +29,10 @@ _INDEX = {parameter.name: index for index, parameter in enumerate(TABLE)}
 class Parameters:
     """The values, by name, and what is left to send of the lists that peers have asked for."""
 
-    def __init__(self) -> None:
-        self._values: dict[str, float] = {p.name: _float32(p) for p in TABLE}
+    def __init__(self, own_defaults: Mapping[str, float] | None = None) -> None:
+        """own_defaults: those that are the vehicle's and not the table's."""
+        self._defaults: dict[str, float] = {p.name: _float32(p) for p in TABLE} | dict(own_defaults or {})
+        self._values = dict(self._defaults)
         self._changed: set[str] = set()
         self._lists: dict[Address, tuple[int, float]] = {}
 
@@ -68,8 +70,8 @@ class Parameters:
 
     def reset(self) -> None:
         """All defaults."""
-        for p in TABLE:
-            self.set(p.name, _float32(p))
+        for name, value in self._defaults.items():
+            self.set(name, value)
 
     def values(self) -> dict[str, float]:
         """Every value by name, integers as `int`."""

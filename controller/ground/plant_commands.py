@@ -86,6 +86,6 @@ def _verdict(result: int) -> Verdict:
     if result == OK.result:
         return OK
     if result == UNSUPPORTED:
-        text = "Failure not injected: the plant has no such unit, failure or instance; see docs/faults.md"
+        text = "Failure not injected: the plant has no such unit, failure or instance; docs/plant.md, Faults"
         return Verdict(UNSUPPORTED, text)
     return Verdict(result, f"Failure not injected: the plant answers with MAV_RESULT {result}")

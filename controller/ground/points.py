@@ -21,6 +21,11 @@ def above(load: Triple, hanging: float) -> Triple:
     return (load[0], load[1], load[2] + hanging)
 
 
+def hanging_load(view: VehicleView, profile: Profile) -> Triple:
+    """Where the load is; a lost one counts as where it would hang, m."""
+    return view.load_position if view.load_attached else below(view.position, profile.hover_length)
+
+
 def controlled_body(view: VehicleView | None) -> Body:
     """Whose position is controlled in flight: the load's, for as long as there is one."""
     return Body.LOAD if view is None or view.load_attached else Body.VEHICLE

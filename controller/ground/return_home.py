@@ -6,6 +6,7 @@ import math
 from enum import Enum, auto
 
 from controller.ground.parameters import Parameters
+from controller.ground.points import above
 from controller.ground.view import Profile, VehicleView
 from sitl_bridge.frames import Triple
 
@@ -35,6 +36,13 @@ class ReturnHome:
     def place(self, view: VehicleView) -> Triple:
         """Where the controlled body belongs, m."""
         return self._home_load if view.load_attached else self._home
+
+    def without_load(self, hanging: float) -> None:
+        """The load is lost: the vehicle goes home at its own height, `hanging` (m) above the load's."""
+        self.point = above(self.point, hanging)
+        if self.step is not Step.CLIMB:  # home is elsewhere than where the load lay
+            self.step = Step.CRUISE
+            self.point = (self._home[0], self._home[1], self.point[2])
 
     def arrived(self, view: VehicleView, p: Parameters, profile: Profile) -> bool:
         """Go on; whether it is time to land."""

@@ -11,7 +11,7 @@ import hashlib
 import hmac
 from pathlib import Path
 
-from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.mavlink.framing import SIGNATURE_LENGTH, Frame
 
 EPOCH = 1420070400.0
 """Signing time stamps count from 2015-01-01, in Unix seconds."""
@@ -19,7 +19,7 @@ TICKS_PER_SECOND = 100_000
 OLDEST_NEW_STREAM = 60 * TICKS_PER_SECOND
 """A sender that was never heard may be so far behind our own time stamp."""
 _SIGNATURE = 6
-_TAIL = 13
+"""Bytes of the signature proper, behind link id and time stamp."""
 
 
 class KeyFileError(ValueError):
@@ -70,8 +70,9 @@ class Signing:
         raw = frame.raw
         if not hmac.compare_digest(self._digest(raw[:-_SIGNATURE]), raw[-_SIGNATURE:]):
             return False
-        stream = (raw[-_TAIL], frame.system, frame.component)
-        timestamp = int.from_bytes(raw[-_TAIL + 1 : -_SIGNATURE], "little")
+        tail = raw[-SIGNATURE_LENGTH:]
+        stream = (tail[0], frame.system, frame.component)
+        timestamp = int.from_bytes(tail[1:-_SIGNATURE], "little")
         latest = self._latest.get(stream, self._now(now) - OLDEST_NEW_STREAM)
         if timestamp <= latest:
             return False

@@ -21,6 +21,7 @@ from controller.ground.outbox import Outbox
 from controller.ground.parameter_file import ParameterFile
 from controller.ground.parameters import Parameters
 from controller.ground.peers import Address, Peers
+from controller.ground.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from controller.ground.px4_modes import Mode
 from controller.ground.signing import Signing
 from controller.ground.stored_parameters import StoredParameters
@@ -45,20 +46,29 @@ _ON_CHANGE = (
 
 
 def standard_peers(instance: int) -> tuple[Address, ...]:
-    """Where PX4 speaks to first: ground stations on 14550, onboard computers on 14540+N."""
+    """Where PX4 speaks to first: ground stations, then onboard computers."""
     return (
-        Address(STATION_LINK, "127.0.0.1", 14550),
-        Address(ONBOARD_LINK, "127.0.0.1", 14540 + instance),
+        Address(STATION_LINK, "127.0.0.1", STATION_PEER),
+        Address(ONBOARD_LINK, "127.0.0.1", ONBOARD_PEER + instance),
     )
 
 
 def local_ports(instance: int) -> tuple[int, int]:
     """The UDP ports of the two links."""
-    return 18570 + instance, 14580 + instance
+    return STATION_LOCAL + instance, ONBOARD_LOCAL + instance
+
+
+def _own_defaults(profile: Profile) -> dict[str, float]:
+    """Defaults that are this vehicle's own."""
+    return {} if profile.battery_cells is None else {"BAT1_N_CELLS": profile.battery_cells}
 
 
 class Station:
-    """Every service of one vehicle. See docs/ground-control.md for how a control loop uses it."""
+    """Every service of one vehicle.
+
+    A control loop calls `update` at every tick and flies the target it gets. It hands in what peers and plant
+    say (`receive`, `hear_plant`), and sends what `to_send` gives, at the latest at `next_deadline`.
+    """
 
     def __init__(
         self,
@@ -69,7 +79,7 @@ class Station:
         peers: tuple[Address, ...] | None = None,
     ) -> None:
         self.profile = profile
-        self.parameters = Parameters()
+        self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
         self.missions = Missions(self.machine.accept_plan)
         self.peers = Peers(standard_peers(profile.instance) if peers is None else peers, now)

@@ -7,6 +7,7 @@ import math
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.verdict import OK, Verdict, deny
+from controller.ground.wire import CurrentMode
 
 FASTEST = 250.0
 """Hz, of any message"""
@@ -31,7 +32,7 @@ DEFAULT_RATES: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 1.0,
-    436: 0.5,  # CURRENT_MODE
+    CurrentMode.id: 0.5,
     mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE: 1.0,
 }
 """Hz, of each message that is sent unasked. PX4's 50 Hz makes clients on a busy machine drop some."""

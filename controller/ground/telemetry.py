@@ -58,6 +58,10 @@ _BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
 _FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
+_CELLS, _FURTHER_CELLS = 10, 4
+"""Fields of BATTERY_STATUS.voltages and .voltages_ext"""
+_NO_CELL = 0xFFFF
+
 Builder = Callable[[Machine, VehicleView], Any]
 
 
@@ -134,19 +138,17 @@ def _global_position(machine: Machine, view: VehicleView) -> Any:
 
 def _gps_raw(machine: Machine, view: VehicleView) -> Any:
     gps = view.gps
-    velocity = view.velocity if gps.velocity is None else gps.velocity
-    place = _place(machine, view.position) if gps.position is None else _wire_place(gps.position)
-    speed = math.hypot(velocity[0], velocity[1])
-    course = heading_from_yaw(math.atan2(velocity[1], velocity[0])) % (2 * math.pi)
+    east, north, _ = gps.velocity
+    course = heading_from_yaw(math.atan2(north, east)) % (2 * math.pi) * CENTIDEGREES_PER_RADIAN
     return mavlink.MAVLink_gps_raw_int_message(
         _microseconds(view),
         gps.fix_type,
-        *place,
+        *((0, 0, 0) if gps.position is None else _wire_place(gps.position)),
         # Dilution of precision times 100: of receivers with 1 m at a dilution of 1.
         whole(gps.horizontal_accuracy * 100, 16, signed=False, unknown=0xFFFF),
         whole(gps.vertical_accuracy * 100, 16, signed=False, unknown=0xFFFF),
-        whole(speed * CENTIMETRES_PER_METRE, 16, signed=False, unknown=0xFFFF),
-        whole(course * CENTIDEGREES_PER_RADIAN, 16, signed=False, unknown=0xFFFF) % 36000,
+        whole(math.hypot(east, north) * CENTIMETRES_PER_METRE, 16, signed=False, unknown=0xFFFF),
+        0xFFFF if math.isnan(course) else whole(course, 16, signed=False) % 36000,
         gps.satellites,
         h_acc=whole(gps.horizontal_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
         v_acc=whole(gps.vertical_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
@@ -182,7 +184,7 @@ def _sys_status(machine: Machine, view: VehicleView) -> Any:
         present,
         present,
         healthy,
-        whole(1000 * view.load_share, 16, signed=False),
+        0,  # load: in lockstep the loop's share of the processor says nothing about the vehicle
         whole(1000 * view.battery_voltage, 16, signed=False, unknown=0xFFFF),
         whole(100 * view.battery_current, 16, unknown=-1),
         whole(100 * view.battery_remaining, 8, unknown=-1),
@@ -214,11 +216,23 @@ def _altitude(machine: Machine, view: VehicleView) -> Any:
     )
 
 
+def cell_voltages(pack: float, cells: int) -> tuple[list[int], list[int]]:
+    """BATTERY_STATUS.voltages and .voltages_ext, mV, of a pack (V, NaN: not known) that is shared evenly."""
+    if not math.isfinite(pack):
+        return [_NO_CELL] * _CELLS, [0] * _FURTHER_CELLS
+    if cells <= _CELLS + _FURTHER_CELLS:
+        each = whole(1000 * pack / cells, 16, signed=False)
+        first, further = ([each] * cells)[:_CELLS], ([each] * cells)[_CELLS:]
+        no_cells, no_further = [_NO_CELL] * (_CELLS - len(first)), [0] * (_FURTHER_CELLS - len(further))
+        return first + no_cells, further + no_further
+    # More than there is room for: the whole pack's, over as many fields as it fills, as the standard says.
+    left = max(0, round(1000 * pack))
+    fields = [min(_NO_CELL - 1, max(0, left - i * (_NO_CELL - 1))) for i in range(_CELLS)]
+    return [fields[0], *(field or _NO_CELL for field in fields[1:])], [0] * _FURTHER_CELLS
+
+
 def _battery_status(machine: Machine, view: VehicleView) -> Any:
-    cells = min(machine.parameters.integer("BAT1_N_CELLS"), 10)
-    known = math.isfinite(view.battery_voltage)
-    each = whole(1000 * view.battery_voltage / cells, 16, signed=False) if known else 0xFFFF
-    voltages = [each] * cells + [0xFFFF] * (10 - cells)
+    voltages, further = cell_voltages(view.battery_voltage, machine.parameters.integer("BAT1_N_CELLS"))
     return mavlink.MAVLink_battery_status_message(
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
@@ -231,6 +245,7 @@ def _battery_status(machine: Machine, view: VehicleView) -> Any:
         whole(100 * view.battery_remaining, 8, unknown=-1),
         0,
         _charge_state(machine, view),
+        further,
     )
 
 
@@ -338,7 +353,7 @@ def _estimator_status(machine: Machine, view: VehicleView) -> Any:
     if health.position:
         flags |= mavlink.ESTIMATOR_POS_HORIZ_ABS | mavlink.ESTIMATOR_POS_VERT_ABS
     ratios = (0.0,) * 6
-    accuracy = (view.gps.horizontal_accuracy, view.gps.vertical_accuracy)
+    accuracy = (0.0, 0.0)  # of the truth
     if quality is not None:
         flags |= mavlink.ESTIMATOR_CONST_POS_MODE * quality.dead_reckoning
         flags |= mavlink.ESTIMATOR_GPS_GLITCH * quality.gps_glitch

@@ -6,12 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from sitl_bridge.frames import Geodetic, LocalOrigin, Quaternion, Triple
+from sitl_bridge.ids import load_system, vehicle_system
 from sitl_bridge.vehicle import Vehicle
-
-VEHICLE_COMPONENT = 1
-"""MAV_COMP_ID_AUTOPILOT1"""
-LOAD_COMPONENT = 35
-"""Component of the slung load, as ArduPilot's simulated one has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +25,20 @@ class Profile:
     """m/s²"""
     has_ground: bool
     """False: there is nothing to land on (`paper`)."""
+    ground_height: float = 0.0
+    """m ENU, of the ground's surface"""
+    battery_cells: int | None = None
+    """In series; None: there is no battery."""
 
     @property
     def system(self) -> int:
         """MAVLink system of the vehicle."""
-        return self.instance + 1
+        return vehicle_system(self.instance)
 
     @property
     def load_system(self) -> int:
         """MAVLink system of the load."""
-        return self.instance + 101
+        return load_system(self.instance)
 
 
 def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> Profile:
@@ -52,6 +52,8 @@ def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> 
         vehicle.hover_length,
         vehicle.gravity,
         has_ground,
+        0.0 if vehicle.ground is None else vehicle.ground.height,
+        None if vehicle.battery is None else vehicle.battery.cells,
     )
 
 
@@ -71,18 +73,20 @@ class Health:
 
 @dataclass(slots=True)
 class Gps:
-    """The last fix of the receiver."""
+    """What the receiver says; without a fix, next to nothing."""
 
-    fix_type: int = 3
-    satellites: int = 10
-    horizontal_accuracy: float = 1.0
+    fix_type: int = 0
+    """GPS_FIX_TYPE: 0 no receiver, 1 no fix, 3 a fix in three dimensions"""
+    satellites: int = 255
+    """255: not known"""
+    horizontal_accuracy: float = math.nan
     """m"""
-    vertical_accuracy: float = 1.5
+    vertical_accuracy: float = math.nan
     """m"""
     position: Geodetic | None = None
-    """None: as the estimate has it."""
-    velocity: Triple | None = None
-    """m/s, ENU. None: as the estimate has it."""
+    """Of the last fix; None: there was none."""
+    velocity: Triple = (math.nan, math.nan, math.nan)
+    """m/s, ENU"""
 
 
 @dataclass(slots=True)
@@ -100,21 +104,27 @@ class EstimateQuality:
     horizontal_accuracy: float
     """m, one standard deviation"""
     vertical_accuracy: float
+    """m, one standard deviation"""
 
 
 @dataclass(slots=True)
 class VehicleView:
-    """The vehicle as its control loop sees it now. World ENU from the origin, body FLU, SI units."""
+    """The vehicle as its control loop sees it now. ENU from the world's origin, the body FLU."""
 
     time: float
     """s since the autopilot's start, on the plant's clock"""
     position: Triple
+    """m, ENU"""
     velocity: Triple
+    """m/s, ENU"""
     attitude: Quaternion
     """FLU to ENU"""
     body_rates: Triple
+    """rad/s, FLU"""
     load_position: Triple
+    """m, ENU"""
     load_velocity: Triple
+    """m/s, ENU"""
     load_attached: bool = True
     cable_taut: bool = True
     vehicle_on_ground: bool = False
@@ -135,8 +145,6 @@ class VehicleView:
     gps: Gps = field(default_factory=Gps)
     quality: EstimateQuality | None = None
     """None: the feedback is the truth"""
-    load_share: float = 0.0
-    """share of the loop's period that its work takes, 0..1"""
 
     @property
     def in_reach(self) -> bool:

@@ -46,6 +46,9 @@ class Pilot(Protocol):
     def hear(self, frame: Frame, now: float) -> None:
         """Take anything else that the plant says."""
 
+    def attend(self, reader: TickReader) -> None:
+        """Where the sensors of each tick can be looked at; told once, before the first."""
+
     def disarm(self) -> None:
         """Stop the rotors; the next step starts afresh."""
 
@@ -70,6 +73,7 @@ class HilSession:
         self._packer = packer
         self._say = say
         self._reader = TickReader(instance)
+        autopilot.attend(self._reader)
         self._feedback = feedback
         self._tick_rate = tick_rate
         self._plain_tick: PlainTick | None = None

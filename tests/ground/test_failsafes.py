@@ -70,10 +70,7 @@ def test_battery() -> None:
     rig.view.battery_remaining = 0.04
     rig.run(0.1)
     assert mode(rig) == "LAND"
-    assert client.got("HEARTBEAT")[-1].system_status in (
-        mavlink.MAV_STATE_EMERGENCY,
-        mavlink.MAV_STATE_CRITICAL,
-    )
+    assert client.got("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_EMERGENCY
 
 
 @pytest.mark.parametrize(

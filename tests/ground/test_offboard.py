@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -9,7 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.targets import Follow
+from controller.ground.view import profile_of
 from controller.trajectory import stopping_distance
+from sitl_bridge.description import load_vehicle
 from tests.ground.in_flight import ACCEPTED, REJECTED, flying, local_setpoint, mode, stream
 from tests.ground.kinematic import PROFILE
 from tests.ground.rig import NAN, Rig
@@ -97,6 +100,19 @@ def test_set_points_faster_than_the_envelope_are_limited() -> None:
     client.command(176, 1, 6, 0)
     stream(rig, client, message, 0.2)
     assert rig.target.velocity == pytest.approx((4.8, 3.6, 2.0))
+
+
+def test_home_of_a_controller_that_starts_in_flight_is_on_the_ground() -> None:
+    rig, _ = flying()
+    again = Rig(dataclasses.replace(PROFILE, ground_height=-3.0), view=rig.view)
+    again.station.machine.resume(again.view, again.now)
+    x, y, _ = rig.view.position
+    assert again.station.machine.home == (x, y, -3.0)
+
+
+def test_the_profile_has_the_ground_of_the_description() -> None:
+    vehicle = load_vehicle("iris", ("ground.height=12.5",))
+    assert profile_of(vehicle).ground_height == 12.5
 
 
 def test_a_controller_that_starts_in_flight_holds() -> None:

@@ -39,7 +39,7 @@ def to_plant(rig: Rig) -> list[Any]:
 
 @pytest.mark.parametrize(
     ("result", "words"),
-    [(0, ""), (3, "docs/faults.md"), (4, "MAV_RESULT 4")],
+    [(0, ""), (3, "docs/plant.md, Faults"), (4, "MAV_RESULT 4")],
     ids=["done", "unknown", "failed"],
 )
 def test_the_plants_answer_is_the_answer(result: int, words: str) -> None:

@@ -9,9 +9,10 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.streams import STREAMABLE
-from controller.ground.telemetry import CAPABILITIES, whole
-from controller.ground.view import Gps
-from sitl_bridge.frames import quaternion_from_euler
+from controller.ground.telemetry import CAPABILITIES, cell_voltages, whole
+from controller.ground.view import Gps, profile_of
+from sitl_bridge.description import load_vehicle
+from sitl_bridge.frames import Geodetic, quaternion_from_euler
 from tests.ground.kinematic import ZURICH, grounded_view
 from tests.ground.rig import Client, Rig
 
@@ -47,6 +48,8 @@ def test_positions_velocities_and_angles() -> None:
         velocity=(1.0, 2.0, 3.0),
         attitude=quaternion_from_euler((0.1, 0.2, 0.3)),
         body_rates=(0.4, 0.5, 0.6),
+        acceleration=(1.0, 2.0, 9.0),
+        gps=Gps(3, 14, 0.7, 1.2, Geodetic(47.5, 8.5, 500.0), (1.1, 2.0, 3.0)),
     )
     heading = math.pi / 2 - 0.3
     local = client.got("LOCAL_POSITION_NED")[0]
@@ -71,10 +74,26 @@ def test_positions_velocities_and_angles() -> None:
         (493, 5, 4.9)
     )
     gps = client.got("GPS_RAW_INT")[0]
-    assert (gps.fix_type, gps.vel, gps.satellites_visible) == (3, 224, 10)
-    assert gps.cog == pytest.approx(math.degrees(math.atan2(1, 2)) * 100, abs=1)
+    assert (gps.fix_type, gps.vel, gps.satellites_visible) == (3, 228, 14)
+    assert (gps.lat, gps.lon, gps.alt) == (
+        475_000_000,
+        85_000_000,
+        500_000,
+    )  # not the estimate's
+    assert (gps.eph, gps.epv, gps.h_acc, gps.v_acc) == (70, 120, 700, 1200)
+    assert gps.cog == pytest.approx(math.degrees(math.atan2(1.1, 2)) * 100, abs=1)
+    imu = client.got("HIGHRES_IMU")[0]
+    assert (imu.xacc, imu.yacc, imu.zacc) == pytest.approx((1, -2, -9))
     home = client.got("HOME_POSITION")[0]
     assert (home.altitude, home.z) == (488100, pytest.approx(-0.1))
+
+
+def test_without_a_fix_nothing_is_made_up() -> None:
+    _, client = seen(position=(10.0, 20.0, 5.0), velocity=(1.0, 2.0, 3.0), gps=Gps())
+    gps = client.got("GPS_RAW_INT")[0]
+    assert (gps.fix_type, gps.satellites_visible) == (0, 255)
+    assert (gps.lat, gps.lon, gps.alt) == (0, 0, 0)
+    assert (gps.eph, gps.epv, gps.vel, gps.cog) == (0xFFFF,) * 4
 
 
 def test_battery_and_status() -> None:
@@ -87,6 +106,38 @@ def test_battery_and_status() -> None:
     _, client = seen(battery_voltage=math.nan, battery_current=math.nan, battery_remaining=math.nan)
     status = client.got("SYS_STATUS")[0]
     assert (status.voltage_battery, status.current_battery, status.battery_remaining) == (0xFFFF, -1, -1)
+
+
+@pytest.mark.parametrize(
+    ("cells", "volts", "voltages", "further"),
+    [
+        (3, 11.4, [3800] * 3 + [0xFFFF] * 7, [0] * 4),
+        (10, 38.0, [3800] * 10, [0] * 4),
+        (12, 45.6, [3800] * 10, [3800] * 2 + [0] * 2),
+        (14, 53.2, [3800] * 10, [3800] * 4),
+        (20, 76.0, [65534, 10466] + [0xFFFF] * 8, [0] * 4),  # no room for 20 cells: the pack's voltage
+        (20, 50.0, [50000] + [0xFFFF] * 9, [0] * 4),
+        (12, math.nan, [0xFFFF] * 10, [0] * 4),
+    ],
+)
+def test_voltages_of_cells(cells: int, volts: float, voltages: list[int], further: list[int]) -> None:
+    assert cell_voltages(volts, cells) == (voltages, further)
+
+
+@pytest.mark.parametrize(("name", "cells"), [("iris", 3), ("heavy", 12), ("paper", 4)])
+def test_the_battery_has_the_vehicles_cells(name: str, cells: int) -> None:
+    rig = Rig(profile_of(load_vehicle(name)))
+    client = rig.client()
+    parameters = rig.station.parameters
+    assert parameters.integer("BAT1_N_CELLS") == cells
+    rig.view.battery_voltage = 3.7 * cells
+    rig.run(3.0)
+    battery = client.got("BATTERY_STATUS")[-1]
+    shown = [*battery.voltages, *battery.voltages_ext]
+    assert [volts for volts in shown if volts not in (0, 0xFFFF)] == [3700] * cells
+    assert parameters.set("BAT1_N_CELLS", 6) == ""
+    parameters.reset()
+    assert parameters.integer("BAT1_N_CELLS") == cells
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e300, -1e9])
@@ -103,7 +154,6 @@ def test_a_state_beyond_all_bounds_is_no_crash(number: float) -> None:
         battery_current=number,
         battery_remaining=number,
         throttle=number,
-        load_share=number,
         acceleration=three,
         gps=Gps(3, 10, number, number, None, three),
     )
