@@ -242,11 +242,7 @@ class TcpLink:
             peer, _ = self._listener.accept()
         except OSError:  # gone again before it was let in
             return
-        last = self._last_sent
         self._take(peer)
-        # What was said while nobody listened was lost; a lockstep partner waits for exactly the last of it.
-        if last:
-            self.send(last)
 
     def _connect(self, until: float) -> None:
         if self._connecting is None:
@@ -274,6 +270,9 @@ class TcpLink:
         self._clear()
         self._peer = peer
         self._say(f"connected on {self._address}")
+        # What was said while nobody listened was lost; a lockstep partner waits for exactly the last of it.
+        if self._last_sent:
+            self.send(self._last_sent)
 
     def _lose(self) -> None:
         assert self._peer is not None
