@@ -20,7 +20,8 @@ from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.parameter_table import TABLE
-from sitl.testing import SimulatedVehicle, flying_vehicle, free_ports
+from sitl.free_ports import free_ports
+from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
