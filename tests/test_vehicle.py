@@ -46,7 +46,7 @@ def test_paper_rotors_are_limited_to_exactly_twice_hover_thrust(paper: Vehicle) 
         assert rotor.max_speed == pytest.approx(math.sqrt(2) * hover_rotor_speed(paper), rel=1e-15)
 
 
-def test_equilibrium_is_that_of_the_errata(paper: Vehicle) -> None:
+def test_equilibrium_is_the_corrected_one(paper: Vehicle) -> None:
     assert paper.hover_length == pytest.approx(1.981, rel=1e-15)
     assert round(hover_rotor_speed(paper), 3) == 22.147
     assert paper.initial_vehicle_position == (0, 0, paper.hover_length)
