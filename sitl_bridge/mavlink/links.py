@@ -11,10 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal, NamedTuple, Protocol
 
-from sitl_bridge.mavlink.framing import Frame, StreamSplitter
+from sitl_bridge.mavlink.framing import LARGEST_DATAGRAM, Frame, StreamSplitter
 from sitl_bridge.mavlink.hil import HIL_SENSOR
 
-LARGEST_DATAGRAM = 65536
 RECEIVE_BUFFER = 1 << 20
 KINDS = ("udpout", "udpin", "tcpin", "tcpout")
 Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections import deque
 
 from sitl_bridge.plant.lateness import Lateness
-from sitl_bridge.plant.link import STOPPED, HilReceiver
+from sitl_bridge.plant.link import HilReceiver
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.state import Array
+from sitl_bridge.plant.state import STOPPED, Array
 
 AUTOPILOT_TIMEOUT = 0.3
 """Silence after which the rotors stop, s."""
