@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from controller.state import WRENCH_SIZE, Array
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import ACTUATOR_CONTROLS
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle import Vehicle, rotor_effect
 
 MOST_ROTORS = ACTUATOR_CONTROLS
 
@@ -32,28 +32,18 @@ Allocation = NDArray[np.void]
 def allocation(vehicle: Vehicle) -> Allocation:
     """The allocation of a vehicle as a record of shape (1,).
 
-    Raises ValueError when the rotors cannot give thrust and all three moments independently, or when some
-    rotor would have no share in the thrust, or a negative one.
+    That the rotors can give thrust and all three moments, each with a share in the thrust, is for the
+    description to make sure.
     """
     record = np.zeros(1, dtype=ALLOCATION)
     p = record[0]
     p["rotor_count"] = count = len(vehicle.rotors)
     for i, rotor in enumerate(vehicle.rotors):
-        x, y, _ = rotor.position
-        sign = -1.0 if rotor.direction == "ccw" else 1.0
-        yaw = sign * rotor.torque_coefficient / rotor.thrust_coefficient
-        p["effect"][:, i] = (1.0, y, -x, yaw)
         p["largest_thrust"][i] = rotor.thrust_coefficient * rotor.max_speed**2
         p["thrust_coefficient"][i] = rotor.thrust_coefficient
         p["largest_speed"][i] = rotor.max_speed
-    effect = p["effect"][:, :count]
-    if np.linalg.matrix_rank(effect) < WRENCH_SIZE:
-        raise ValueError(f"{vehicle.name}: the rotors cannot give thrust and all three moments independently")
+    p["effect"][:, :count] = effect = rotor_effect(vehicle.rotors)
     p["inverse"][:count] = np.linalg.pinv(effect)
-    collective = p["inverse"][:count, 0]
-    if np.any(collective <= 1e-6 / count):
-        idle = ", ".join(str(i) for i in np.flatnonzero(collective <= 1e-6 / count))
-        raise ValueError(f"{vehicle.name}: thrust without moments leaves nothing to rotors {idle}")
     return record
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+from sitl.free_ports import free_ports  # noqa: E402
+
 INDEPENDENT_TIME = 10.0
 """s after which errors are taken as independent, for the bounds of NEES."""
 NEES_STATES = 15
@@ -27,7 +29,7 @@ SKIPPED = 20.0
 
 
 class Case(NamedTuple):
-    """A row: what flies on what, and what issue 6 asks of it (m), per seed half as much again."""
+    """A row: what flies on what, and the accuracy that it should reach (m), per seed half as much again."""
 
     rest_length: float
     sensors: str
@@ -52,9 +54,7 @@ def summary_of(case: Case, seed: int, duration: float, out: Path) -> dict[str, A
     folder = out / f"{case.feedback}-{case.sensors}-{case.rest_length:g}-{seed}-{duration:g}"
     summary = folder / "summary.json"
     if not summary.exists() or not json.loads(summary.read_text())["completed"]:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        [port] = free_ports(1)
         command = [sys.executable, "-m", "sitl", "fly", "hover", "--clock", "lockstep", "--out", str(folder)]
         command += ["--feedback", case.feedback, "--sensors", case.sensors, "--seed", str(seed)]
         command += ["--set", "disturbance.force_std=5", "--set", f"cable.rest_length={case.rest_length}"]

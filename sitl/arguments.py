@@ -34,8 +34,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     fly.add_argument("scenario", metavar="SCENARIO", help="a scenario's name (see below) or .toml file")
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
-    for add in (_vehicle, _link, _clock, _loop, _control, _run, _ground, _output):
+    for add in (_vehicle, _link, _clock, _loop, _control, _seed, _ground, _output):
         add(fly)
+    _duration(fly, "the scenario's, or until stopped")
     fly.add_argument(
         "--plant-set",
         metavar="KEY=VALUE",
@@ -49,8 +50,9 @@ def build_parser() -> argparse.ArgumentParser:
         help="simulate vehicle, cable and load",
         description="Simulate vehicle, cable and load, and speak PX4's simulator API on the HIL link.",
     )
-    for add in (_scenario, _vehicle, _link, _clock, _loop, _run, _output, _supervised):
+    for add in (_scenario, _vehicle, _link, _clock, _loop, _seed, _output, _supervised):
         add(plant)
+    _duration(plant, "the scenario's, or until stopped")
     plant.add_argument(
         "--load-to",
         metavar="HOST:PORT",
@@ -63,8 +65,9 @@ def build_parser() -> argparse.ArgumentParser:
         help="fly the vehicle",
         description="Be the autopilot: answer the plant's ticks with rotor commands.",
     )
-    for add in (_scenario, _vehicle, _link, _loop, _control, _run, _ground, _supervised):
+    for add in (_scenario, _vehicle, _link, _loop, _control, _seed, _ground, _supervised):
         add(controller)
+    _duration(controller, "until stopped")
     controller.add_argument(
         "--json", action="store_true", help="one JSON object on standard output at the end"
     )
@@ -236,18 +239,21 @@ def _ground(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _run(parser: argparse.ArgumentParser) -> None:
+def _seed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
         type=whole(0, 2**31 - 1, "a seed"),
         default=0,
         help="seed of everything random (default: 0)",
     )
+
+
+def _duration(parser: argparse.ArgumentParser, default: str) -> None:
     parser.add_argument(
         "--duration",
         metavar="S",
         type=number(0.01, 1e6, "seconds"),
-        help="how long to fly (default: the scenario's, or until stopped)",
+        help=f"how long to fly (default: {default})",
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import socket
 import statistics
 import subprocess
 import sys
@@ -18,7 +17,8 @@ import numpy as np
 from controller.autopilot import Autopilot
 from controller.hil.answers import AnswerWriter
 from controller.reference import setpoint
-from sitl.fly import Pair, watch
+from sitl.fly import FlightError, Pair, watch
+from sitl.free_ports import free_ports
 from sitl.ground_bench import ground_figures
 from sitl.roundtrip import round_trip_us
 from sitl_bridge.description import load_vehicle
@@ -41,13 +41,6 @@ FULL = (
 """What makes `iris`, which has ground, rotor lag, drag and a battery, a plant with everything on."""
 ON_TRUTH, ON_ESTIMATE = ("--feedback", "truth"), ("--feedback", "estimate")
 WARMING_TICKS = 250
-
-
-def free_udp_port() -> int:
-    """A UDP port on loopback that nobody has just now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def physics_step_us(vehicle: Vehicle) -> float:
@@ -115,14 +108,14 @@ def estimator_update_us(vehicle: Vehicle) -> float:
 
 def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ON_TRUTH) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
-    port = free_udp_port()
+    [port] = free_ports(1)
     sensors = ["--set", "sensors.preset=consumer"] if feedback == ON_ESTIMATE else []
     common = ["--scenario", scenario, "--rate", str(RATE_HZ), *sensors, *more]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
     controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
     if outcome.failure:
-        raise RuntimeError(outcome.failure)
+        raise FlightError(outcome.failure)
     return outcome.end
 
 
@@ -130,11 +123,14 @@ def launch_to_first_command_s(feedback: Sequence[str] = ()) -> float:
     """Time from the launch of `sitl fly` to the first rotor command at the plant, s."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "sitl", "fly", "hover", "--duration", "0.1", "--out", folder]
-        command += ["--hil", f"udpout:127.0.0.1:{free_udp_port()}"]
+        command += ["--hil", f"udpout:127.0.0.1:{free_ports(1)[0]}"]
         command += feedback
         launched = time.time()
         subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-        summary = json.loads((Path(folder) / "summary.json").read_text())
+        file = Path(folder) / "summary.json"
+        summary = json.loads(file.read_text()) if file.exists() else {}
+        if summary.get("first_command_unix_s") is None:
+            raise FlightError(summary.get("failure") or "`sitl fly` did not fly")
         return float(summary["first_command_unix_s"]) - launched
 
 

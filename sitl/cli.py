@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sitl.arguments import build_parser
@@ -161,25 +159,25 @@ def _fly(arguments: argparse.Namespace) -> int:
         duration_s=arguments.duration,
         drop_percent=arguments.drop,
         instance=arguments.instance,
-        out=arguments.out
-        or Path("runs") / f"{Path(arguments.scenario).stem}-{time.strftime('%Y%m%d-%H%M%S')}",
+        out=arguments.out,
     )
     stop = StopRequest()
     stop.install()
     if isinstance(scenario.reference, GroundControl):
         check_design(arguments.design)
-        options = replace(options, out=arguments.out, ground=ground_arguments(_ground_options(arguments)))
+        if arguments.json:
+            raise DescriptionError("--json", ["under ground control there is no summary to print"])
+        options = replace(options, ground=ground_arguments(_ground_options(arguments)))
         failure = hold(options, stop)
         if failure:
             print(f"fly: {failure}", file=sys.stderr, flush=True)
         return EXIT_FAILED if failure else 0
-    summary = fly(options, stop)
+    summary, out = fly(options, stop)
     if arguments.json:
         print(json.dumps(summary, indent=2))
     else:
         print(table(summary))
-        assert options.out is not None
-        for name in sorted(options.out.iterdir()):
+        for name in sorted(out.iterdir()):
             print(f"  {name}")
     if stop:
         return EXIT_INTERRUPTED
@@ -188,8 +186,13 @@ def _fly(arguments: argparse.Namespace) -> int:
 
 def _bench(arguments: argparse.Namespace) -> int:
     from sitl.bench import bench, table
+    from sitl.fly import FlightError
 
-    results = bench(arguments.repeats)
+    try:
+        results = bench(arguments.repeats)
+    except FlightError as error:
+        print(f"bench: {error}", file=sys.stderr)
+        return EXIT_FAILED
     print(json.dumps(results, indent=2) if arguments.json else table(results))
     return 0
 

@@ -69,8 +69,10 @@ def rows_at(times: Array, wanted: Array) -> tuple[NDArray[np.int64], NDArray[np.
     return first.astype(np.int64), second.astype(np.int64)
 
 
-def rms(values: Array) -> list[float]:
-    """Root mean square, about zero, of each column."""
+def rms(values: Array) -> list[float] | None:
+    """Root mean square, about zero, of each column; None without rows."""
+    if not len(values):
+        return None
     return [float(value) for value in np.sqrt(np.mean(values**2, axis=0))]
 
 
@@ -79,7 +81,7 @@ def estimate_metrics(
 ) -> dict[str, Any]:
     """`estimate` of summary.json, but for the bound; reference (n, 3) of the load at the state log's rows.
 
-    Judged over the steady part of the flight, where both logs have a row.
+    Judged over the steady part of the flight, where both logs have a row; None is what no row tells.
     """
     times, logged = state_log["time_s"], np.stack([estimate_log[name] for name in COLUMNS], axis=1)
     late = steady(times)
@@ -90,9 +92,10 @@ def estimate_metrics(
     judged = error[row][:, NEES_STATES]
     cov = covariances(covariance_log)[at][:, NEES_STATES[:, None], NEES_STATES]
     nees = np.einsum("ni,ni->n", judged, np.linalg.solve(cov, judged[:, :, None])[:, :, 0]) / len(NEES_STATES)
+    judgements, within = logged[-1, -2:] if len(logged) else (0.0, 0.0)
     return {
         "load_relative_rms_m": rms(error[:, LOAD_POSITION] - error[:, VEHICLE_POSITION]),
         "load_rms_m": rms((truth[:, LOAD_POSITION] - reference)[late]),
-        "nees_mean": float(np.mean(nees)),
-        "innovations_in_bounds": float(logged[-1, -1] / logged[-1, -2]),
+        "nees_mean": float(np.mean(nees)) if len(nees) else None,
+        "innovations_in_bounds": float(within / judgements) if judgements else None,
     }

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import sys
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from controller.feedback import estimates
 from sitl.fly import Pair, ProgressLine, watch
 from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
+from sitl_bridge.description import Override
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle import Vehicle
 
 MIRRORED: dict[str, Any] = {"udpout": "udpin", "udpin": "udpout", "tcpin": "tcpout", "tcpout": "tcpin"}
 """Kind of the other end of a link."""
@@ -42,6 +47,7 @@ class FlightOptions:
     drop_percent: float
     instance: int
     out: Path | None
+    """None: a new folder under runs/; under ground control, no logs."""
     ground: Sequence[str] = ()
     """Arguments of the controller for its ground-control links."""
 
@@ -71,19 +77,40 @@ class FlightOptions:
             controller += ["--out", str(self.out)]
         return plant, [*controller, *self.ground]
 
+    def checked_vehicle(self) -> Vehicle:
+        """The vehicle as the controller is told, once it is sure that the processes take what they are given.
 
-def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
-    """Fly; returns the summary, which is also in the output folder. Raises DescriptionError, OSError."""
+        Raises DescriptionError, before anything is launched.
+        """
+        only_plant = [Override(text, "--plant-set") for text in self.plant_overrides]
+        flown = plant_vehicle(self.scenario, self.vehicle, [*self.overrides, *only_plant])
+        checked(self.scenario.faults, flown)
+        return scenario_vehicle(self.scenario, self.vehicle, self.overrides)
+
+
+def new_folder(folder: Path) -> Path:
+    """Make a folder that was not there before, numbered if need be; returns it."""
+    for name in itertools.chain([folder.name], (f"{folder.name}-{n}" for n in itertools.count(2))):
+        made = folder.with_name(name)
+        with contextlib.suppress(FileExistsError):
+            made.mkdir(parents=True)
+            return made
+    raise AssertionError("numbers do not end")
+
+
+def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path]:
+    """Fly; returns the summary and the output folder, where it is too. Raises DescriptionError, OSError."""
     scenario = options.scenario
-    vehicle = scenario_vehicle(scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    flown = plant_vehicle(scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
-    checked(scenario.faults, flown)
+    vehicle = options.checked_vehicle()
+    if options.out is None:
+        name = f"{Path(options.scenario_name).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+        options = replace(options, out=new_folder(Path("runs") / name))
     assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)
     assert not isinstance(scenario.reference, GroundControl)  # see `sitl.hold`
     path_from = scenario.reference.path
     line = ProgressLine(sys.stderr)
-    start = vehicle.initial.load_position
+    start = vehicle.initial_load_position
     reference: list[Any] = []  # made at the first progress event: it needs the autopilot's imports
 
     def show(event: dict[str, Any]) -> None:
@@ -123,4 +150,5 @@ def fly(options: FlightOptions, stop: StopRequest) -> dict[str, Any]:
         **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
     }
     path = path_from(start)
-    return write_report(options.out, facts, path, vehicle if estimates(feedback, vehicle) else None)
+    estimating = vehicle if estimates(feedback, vehicle) else None
+    return write_report(options.out, facts, path, estimating), options.out

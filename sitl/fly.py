@@ -20,6 +20,10 @@ PATIENCE = 10.0
 POLL_INTERVAL = 0.1
 
 
+class FlightError(RuntimeError):
+    """A flight did not take place as asked for."""
+
+
 @dataclass
 class Outcome:
     """How a pair of processes ended."""

@@ -16,8 +16,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from sitl.fly import Pair, watch
-from sitl.testing import free_ports
+from sitl.fly import FlightError, Pair, watch
+from sitl.free_ports import free_ports
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Packer, split
 from sitl_bridge.process import StopRequest
@@ -61,7 +61,7 @@ def _flight(rate_hz: float, clients: int, clock: str) -> dict[str, Any]:
         listening.kill()
         listening.wait()
     if outcome.failure:
-        raise RuntimeError(outcome.failure)
+        raise FlightError(outcome.failure)
     return outcome.end
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from sitl.flight import FlightOptions
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.scenario import plant_vehicle, scenario_vehicle
 from sitl_bridge.description import DescriptionError
 from sitl_bridge.process import StopRequest
 
@@ -37,8 +36,7 @@ def check_design(design: str) -> None:
 
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     """Run both processes until asked to stop; returns what went wrong before that, if something did."""
-    scenario_vehicle(options.scenario, options.vehicle, options.overrides)  # a fault shows before launch
-    plant_vehicle(options.scenario, options.vehicle, [*options.overrides, *options.plant_overrides])
+    options.checked_vehicle()
     line = ProgressLine(sys.stderr)
 
     def show(event: dict[str, Any]) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from controller.estimate_log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.reference import Path as ReferencePath
 from sitl.metrics import SETTLED_WINDOW, flight_metrics, reference_positions
+from sitl.plain import plain
 from sitl_bridge.plant.statelog import FILE_NAME
 from sitl_bridge.vehicle import Vehicle
 
@@ -66,7 +67,9 @@ def write_report(
         summary["state_log"] = str(state_log)
         summary["state_log_sha256"] = hashlib.sha256(state_log.read_bytes()).hexdigest()
     summary["settled"] = bool(summary["settled"] and facts.get("completed"))
-    (out / SUMMARY_NAME).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    summary = {key: plain(value) for key, value in summary.items()}  # a flight that diverged has no figures
+    text = json.dumps(summary, indent=2, allow_nan=False)
+    (out / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
     return summary
 
 
@@ -137,8 +140,8 @@ def table(summary: dict[str, Any]) -> str:
         ("tracking rms", _with_unit(_scaled(summary.get("tracking_rms_m"), 1e3), "mm", 3)),
         ("real-time factor", _with_unit(summary.get("real_time_factor"), "", 2)),
         ("lateness p50 / p99 / max", _lateness(summary.get("lateness_us") or {})),
-        ("late ticks", str(summary.get("late_ticks"))),
-        ("resent ticks", str(summary.get("resent_ticks"))),
+        ("late ticks", _with_unit(summary.get("late_ticks"), "", 0)),
+        ("resent ticks", _with_unit(summary.get("resent_ticks"), "", 0)),
     ]
     return "\n".join(f"  {name:<26}{value}" for name, value in rows if value)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from sitl_bridge.description import load_vehicle, read_toml, shipped, validated
+from sitl_bridge.description import Override, load_vehicle, read_toml, shipped, validated
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.schema import Section, Vector, quantity
 from sitl_bridge.vehicle import Vehicle
@@ -63,6 +63,7 @@ class GroundControl(Section):
     kind: Literal["ground-control"]
 
 
+Overrides = Sequence[str | Override]
 Reference = Annotated[Hover | Setpoint | Circle | GroundControl, Field(discriminator="kind")]
 
 
@@ -92,14 +93,18 @@ def load_scenario(name_or_file: str) -> Scenario:
     return validated(Scenario, content, source)
 
 
-def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
+def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
     """The scenario's vehicle, with what the command line says on top."""
-    return load_vehicle(vehicle or scenario.vehicle, [*scenario.set, *overrides])
+    return load_vehicle(vehicle or scenario.vehicle, [*_entries("set", scenario.set), *overrides])
 
 
-def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Sequence[str]) -> Vehicle:
+def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
     """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
-    return scenario_vehicle(scenario, vehicle, [*scenario.plant_set, *overrides])
+    return scenario_vehicle(scenario, vehicle, [*_entries("plant_set", scenario.plant_set), *overrides])
+
+
+def _entries(key: str, texts: Sequence[str]) -> list[Override]:
+    return [Override(text, f"scenario: {key}.{index}") for index, text in enumerate(texts)]
 
 
 def usual_feedback(scenario: Scenario | None, vehicle: Vehicle) -> str:

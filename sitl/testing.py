@@ -9,13 +9,14 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from sitl.free_ports import free_ports
 
 START_PATIENCE = 120.0
 """s; the first start on a machine compiles"""
@@ -38,17 +39,6 @@ class SimulatedVehicle:
     """The simulated truth, a Parquet file; complete when the vehicle is gone"""
     log: Path
     """What the processes said"""
-
-
-def free_ports(count: int) -> list[int]:
-    """UDP ports on loopback that nobody has just now."""
-    with contextlib.ExitStack() as stack:
-        sockets = [
-            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) for _ in range(count)
-        ]
-        for each in sockets:
-            each.bind(("127.0.0.1", 0))
-        return [each.getsockname()[1] for each in sockets]
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
@@ -24,6 +24,13 @@ class DescriptionError(ValueError):
         self.source = source
         self.faults = faults
         super().__init__("\n".join(f"{source}: {fault}" for fault in faults))
+
+
+class Override(NamedTuple):
+    """One value of a description to change, `KEY=VALUE`, and where a person has said so."""
+
+    text: str
+    source: str = "--set"
 
 
 def shipped(folder: Any) -> list[str]:
@@ -62,14 +69,14 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
         raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
 
 
-def load_vehicle(name_or_file: str, overrides: Iterable[str] = ()) -> Vehicle:
+def load_vehicle(name_or_file: str, overrides: Iterable[str | Override] = ()) -> Vehicle:
     """Load a vehicle by shipped name or path, with `KEY=VALUE` overrides (`cable.rest_length=10`).
 
     Raises DescriptionError, with one line for each fault.
     """
     source, content = read_toml(name_or_file, resources.files(__package__) / "vehicles", "vehicle")
     for override in overrides:
-        apply_override(content, override)
+        apply_override(content, override if isinstance(override, Override) else Override(override))
     if isinstance(sensors := content.get("sensors"), dict) and "preset" in sensors:
         _, preset = read_toml(str(sensors["preset"]), resources.files(__package__) / "presets", "preset")
         content["sensors"] = _merged(preset, sensors)
@@ -85,12 +92,12 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def apply_override(content: dict[str, Any], override: str) -> None:
+def apply_override(content: dict[str, Any], override: Override) -> None:
     """Set one value of nested tables from `table.key=VALUE`, VALUE being TOML or a bare word."""
-    key, equals, text = override.partition("=")
-    path = key.strip().split(".")
+    key, equals, text = override.text.partition("=")
+    path, source = key.strip().split("."), override.source
     if not equals or not all(path):
-        raise DescriptionError("--set", [f"{override!r}: expected KEY=VALUE, as in cable.rest_length=10"])
+        raise DescriptionError(source, [f"{override.text!r}: expected KEY=VALUE, as in cable.rest_length=10"])
     try:
         parsed = tomllib.loads(f"value = {text.strip()}")
     except ValueError:
@@ -102,10 +109,10 @@ def apply_override(content: dict[str, Any], override: str) -> None:
         place: Any = step
         if isinstance(target, list):
             if not step.isdecimal() or int(step) >= len(target):
-                raise DescriptionError("--set", [f"{key}: {step!r} is no index of a list of {len(target)}"])
+                raise DescriptionError(source, [f"{key}: {step!r} is no index of a list of {len(target)}"])
             place = int(step)
         elif not isinstance(target, dict):
-            raise DescriptionError("--set", [f"{key}: {step!r} lies below a value that is not a table"])
+            raise DescriptionError(source, [f"{key}: {step!r} lies below a value that is not a table"])
         if following is None:
             target[place] = value
         else:

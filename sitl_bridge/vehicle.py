@@ -7,14 +7,19 @@ the world is ENU with z up, the body FLU; angles are in radians.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.schema import Section, Vector, quantity
 from sitl_bridge.sensors import Sensors
+
+SMALLEST_SHARE = 1e-6
+"""Of a rotor in the thrust without moments, against that of rotors that share it evenly."""
 
 
 class Drag(Section):
@@ -54,6 +59,16 @@ class Rotor(Section):
         le=20,
     )
     time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
+
+
+def rotor_effect(rotors: Sequence[Rotor]) -> NDArray[np.float64]:
+    """Thrust and moments about x, y, z (N and N m, body FLU) of a newton of each rotor: (4, n), eq. 13."""
+    columns = []
+    for rotor in rotors:
+        x, y, _ = rotor.position
+        sign = -1.0 if rotor.direction == "ccw" else 1.0
+        columns.append((1.0, y, -x, sign * rotor.torque_coefficient / rotor.thrust_coefficient))
+    return np.array(columns).T
 
 
 class Cable(Section):
@@ -190,6 +205,23 @@ class Vehicle(Section):
         return self
 
     @model_validator(mode="after")
+    def _can_steer(self) -> Vehicle:
+        effect = rotor_effect(self.rotors)
+        if np.linalg.matrix_rank(effect) < len(effect):
+            raise ValueError(
+                "rotors: they cannot give thrust and all three moments independently; "
+                "expected hubs on all sides, some cw and some ccw, with torque_coefficient > 0"
+            )
+        share = np.linalg.pinv(effect)[:, 0]
+        idle = [str(i) for i in np.flatnonzero(share <= SMALLEST_SHARE / len(share))]
+        if idle:
+            raise ValueError(
+                f"rotors: thrust without moments leaves nothing to {', '.join(idle)}; "
+                "expected hubs on all sides, and as much cw as ccw"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _can_stand(self) -> Vehicle:
         if self.ground is not None and len(self.airframe.legs) < 3:
             raise ValueError("airframe.legs: on ground a vehicle needs three or more; expected points in m")
@@ -245,16 +277,6 @@ def hover_rotor_speed(vehicle: Vehicle) -> float:
 
 def hover_rotor_speeds(vehicle: Vehicle) -> tuple[float, ...]:
     """Rotor speeds that carry vehicle and load without any moment, for any layout, rad/s."""
-    effect = np.array(
-        [
-            (
-                rotor.thrust_coefficient,
-                rotor.position[1] * rotor.thrust_coefficient,
-                -rotor.position[0] * rotor.thrust_coefficient,
-                (-1.0 if rotor.direction == "ccw" else 1.0) * rotor.torque_coefficient,
-            )
-            for rotor in vehicle.rotors
-        ]
-    ).T
+    effect = rotor_effect(vehicle.rotors) * [rotor.thrust_coefficient for rotor in vehicle.rotors]
     squared, *_ = np.linalg.lstsq(effect, np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]), rcond=None)
     return tuple(np.sqrt(np.maximum(squared, 0.0)).tolist())

@@ -136,6 +136,27 @@ def test_a_peer_that_does_not_read_blocks_nobody(server: TcpLink) -> None:
         assert server.connected
 
 
+def test_a_client_repeats_after_a_loss_what_it_said_last(said: list[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE)
+        client = TcpLink(Address("tcpout", "127.0.0.1", server.getsockname()[1]), said.append)
+        try:
+            client.send(b"one")  # nobody listens yet
+            for said_last in (b"one", b"two"):
+                meet(client)
+                peer, _ = server.accept()
+                with peer:
+                    peer.settimeout(PATIENCE)
+                    assert peer.recv(10) == said_last
+                deadline = time.monotonic() + PATIENCE
+                while client.connected:
+                    client.receive(time.monotonic() + 0.05)
+                    assert time.monotonic() < deadline
+                client.send(b"two")  # nobody listens any more
+        finally:
+            client.close()
+
+
 @pytest.mark.parametrize("kind", ["tcpin", "tcpout"])
 def test_waits_end_in_time_without_a_peer(kind: str) -> None:
     with socket.socket() as probe:

@@ -46,7 +46,7 @@ def test_paper_rotors_are_limited_to_exactly_twice_hover_thrust(paper: Vehicle) 
         assert rotor.max_speed == pytest.approx(math.sqrt(2) * hover_rotor_speed(paper), rel=1e-15)
 
 
-def test_equilibrium_is_that_of_the_errata(paper: Vehicle) -> None:
+def test_equilibrium_is_the_corrected_one(paper: Vehicle) -> None:
     assert paper.hover_length == pytest.approx(1.981, rel=1e-15)
     assert round(hover_rotor_speed(paper), 3) == 22.147
     assert paper.initial_vehicle_position == (0, 0, paper.hover_length)
@@ -95,6 +95,7 @@ def test_file_by_path_reads_as_the_shipped_one(tmp_path: Path, paper: Vehicle) -
         ("disturbance.force_std=-5", ["disturbance.force_std = -5 N", ">= 0 and <= 10000"]),
         ("home.latitude=90", ["home.latitude = 90 deg", ">= -89 and <= 89"]),
         ("load.mass=60", ["rotors give 392.4 N", "hovering takes 686.7 N"]),
+        ("rotors.3.direction=ccw", ["rotors:", "leaves nothing to 0, 2", "expected"]),
         ("initial.vehicle_position=[0, 0, 0]", ["initial.vehicle_position", "no cable direction"]),
         ("airframe.mass=1\nload.mass=2", ["airframe.mass = '1\\nload.mass=2' kg", "number"]),
     ],
@@ -104,6 +105,12 @@ def test_a_fault_is_one_line_with_key_value_unit_and_range(override: str, words:
     assert "\n" not in line
     for word in words:
         assert word in line
+    assert len(line) < 160
+
+
+def test_rotors_that_give_no_yaw_are_refused() -> None:
+    (line,) = faults(*(f"rotors.{i}.{change}" for i in range(4) for change in ("torque_coefficient=0",)))
+    assert line.startswith("rotors: they cannot give thrust and all three moments independently; expected")
     assert len(line) < 160
 
 
@@ -126,7 +133,7 @@ def test_overrides_reach_into_lists_and_absent_tables_and_the_last_one_wins() ->
         "paper",
         [
             "rotors.1.position.2=0.25",
-            "rotors.3.direction=ccw",
+            "rotors.3.diameter=2",
             "airframe.inertia=[0.01, 0.02, 0.03]",
             "loop.delay_ticks=1",
             "loop.delay_ticks = 2",
@@ -136,7 +143,7 @@ def test_overrides_reach_into_lists_and_absent_tables_and_the_last_one_wins() ->
         ],
     )
     assert vehicle.rotors[1].position == (0, 1, 0.25)
-    assert [rotor.direction for rotor in vehicle.rotors] == ["ccw", "cw", "ccw", "ccw"]
+    assert [rotor.diameter for rotor in vehicle.rotors] == [None, None, None, 2]
     assert vehicle.airframe.inertia == (0.01, 0.02, 0.03)
     assert vehicle.loop.delay_ticks == 2
     assert vehicle.name == "two words"

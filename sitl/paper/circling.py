@@ -27,7 +27,7 @@ RADIUS = 5.0
 AGREEMENT = 0.05
 """Flown at 250 Hz against the paper's continuous gains in the second simulation, m."""
 LAGS = {"1": 75.0, "10": 109.0}
-"""errata.md, degrees"""
+"""Degrees, for l₀ = 1 and 10 m; docs/paper.md"""
 
 
 def turns(quick: bool) -> int:

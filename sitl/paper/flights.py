@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -12,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.flight import FlightOptions
-from sitl.fly import Pair, watch
+from sitl.fly import FlightError, Pair, watch
+from sitl.free_ports import free_ports
 from sitl.metrics import reference_positions
 from sitl.report import positions, read_state_log
 from sitl.scenario import GroundControl, load_scenario, scenario_vehicle
@@ -24,10 +24,6 @@ from sitl_bridge.vehicle import Vehicle
 Array = NDArray[np.float64]
 
 RATE_HZ = 250.0
-
-
-class FlightError(RuntimeError):
-    """A flight did not take place as asked for."""
 
 
 class Flight(NamedTuple):
@@ -140,7 +136,7 @@ class Pilot:
         log = read_state_log(out / FILE_NAME)
         vehicle = scenario_vehicle(description, None, [*request.overrides, *request.plant_overrides])
         assert not isinstance(description.reference, GroundControl)  # the paper flies references only
-        path = description.reference.path(vehicle.initial.load_position)
+        path = description.reference.path(vehicle.initial_load_position)
         return Flight(
             command=request.command,
             vehicle_description=vehicle,
@@ -156,9 +152,7 @@ class Pilot:
     def _free_port(self) -> int:
         """A UDP port of 127.0.0.1 that is free now, and that no other flight of this run was given."""
         while True:
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-                probe.bind(("127.0.0.1", 0))
-                port = int(probe.getsockname()[1])
+            [port] = free_ports(1)
             if port not in self._ports:
                 self._ports.add(port)
                 return port

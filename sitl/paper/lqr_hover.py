@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 BAND = 0.25
 """What V.A keeps x, y and z within, m."""
 FORCE_STD = 5.0
-"""Standard deviation of the white force on the load, N (errata.md: the paper does not say)."""
+"""Standard deviation of the white force on the load, N (docs/paper.md: the paper does not say)."""
 HOLD_TIME = 0.01
 """s"""
 AGREEMENT = 1e-3

@@ -36,7 +36,7 @@ EXPECTED = {
     "1": {"settling_time_2pct_s": (4.07, 0.1), "overshoot_pct": (9.2, 1.0)},
     "10": {"settling_time_2pct_s": (6.3, 0.1), "overshoot_pct": (25.0, 1.5)},
 }
-"""For l₀ = 10 m errata.md and the figures to reach; for 1 m the continuous design, simulated beforehand."""
+"""For l₀ = 10 m the figures to reach (docs/paper.md); for 1 m the continuous design, simulated beforehand."""
 
 
 def requests(quick: bool) -> list[Request]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
+from sitl.plain import plain
 
 REPRODUCED = "reproduced"
 CORRECTED = "reproduced with a correction"
@@ -110,22 +110,3 @@ class Ledger:
         """The content of paper.json."""
         verdicts = {v.key: {k: x for k, x in v._asdict().items() if k != "key"} for v in self.verdicts}
         return {**self.numbers, "checks": self.checks, "verdicts": verdicts}
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON has it: arrays as lists, complex numbers as [re, im], what is not finite as null."""
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, complex):
-        return [plain(value.real), plain(value.imag)]
-    if isinstance(value, (bool, np.bool_)):
-        return bool(value)
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return float(value) if math.isfinite(value) else None
-    return value

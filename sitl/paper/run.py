@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from sitl.fly import FlightError
 from sitl.paper import (
     circling,
     elasticity,
@@ -24,7 +25,7 @@ from sitl.paper import (
     sampling,
 )
 from sitl.paper.context import Context
-from sitl.paper.flights import FlightError, Pilot
+from sitl.paper.flights import Pilot
 from sitl.paper.record import Ledger
 from sitl_bridge.process import StopRequest
 

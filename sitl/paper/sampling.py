@@ -32,7 +32,7 @@ LENGTH = "10"
 
 
 STATED_RATES_HZ = (507.0, 1037.0)
-"""What errata.md asks for, without delay and with one sample of it: both a little on the safe side."""
+"""Stated beforehand, without delay and with one sample of it: both a little on the safe side."""
 
 
 def held(model: LinearModel, period: float) -> tuple[Array, Array]:
@@ -236,9 +236,7 @@ def _sampled(context: Context, vehicle: Vehicle, model: LinearModel) -> str:
             key = f"sampling.sampled_design.{rate_hz:.0f}_hz_delay_{delay}"
             ledger.at_most(f"{key}.spectral_radius", radius, 1.0 - 1e-6, "", "stable")
             continuous = max(p[0] for p in ledger.numbers["closed_loop_poles"]["K_integral"][LENGTH])
-            ledger.check(
-                f"{key}.slowest_pole_1_s", slowest, continuous, 0.02, "1/s", "design.md: keeps slow poles"
-            )
+            ledger.check(f"{key}.slowest_pole_1_s", slowest, continuous, 0.02, "1/s", "slow poles stay")
             time: float | None = None
             if rate_hz <= 250.0:
                 path = setpoint(TARGET, (0.0, 0.0, 0.0))

@@ -208,7 +208,7 @@ class Split(NamedTuple):
     junk: int
     """Number of bytes that belong to no good frame."""
     rest: bytes
-    """A beginning that may become a frame with more bytes; only a stream goes on, a datagram ends here."""
+    """A beginning that may become a frame with more bytes, shorter than a frame; a datagram has no more."""
 
 
 _buffer = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
@@ -243,7 +243,7 @@ class StreamSplitter:
     def receive(self, data: bytes) -> list[Frame]:
         """Add bytes from the stream, return the frames they complete."""
         found = split(self._rest + data)
-        self._rest = found.rest[:LARGEST_FRAME] if len(found.rest) > LARGEST_FRAME else found.rest
+        self._rest = found.rest
         self.junk += found.junk
         return found.frames
 

@@ -11,10 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Literal, NamedTuple, Protocol
 
-from sitl_bridge.mavlink.framing import Frame, StreamSplitter
+from sitl_bridge.mavlink.framing import LARGEST_DATAGRAM, Frame, StreamSplitter
 from sitl_bridge.mavlink.hil import HIL_SENSOR
 
-LARGEST_DATAGRAM = 65536
 RECEIVE_BUFFER = 1 << 20
 KINDS = ("udpout", "udpin", "tcpin", "tcpout")
 Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]
@@ -242,11 +241,7 @@ class TcpLink:
             peer, _ = self._listener.accept()
         except OSError:  # gone again before it was let in
             return
-        last = self._last_sent
         self._take(peer)
-        # What was said while nobody listened was lost; a lockstep partner waits for exactly the last of it.
-        if last:
-            self.send(last)
 
     def _connect(self, until: float) -> None:
         if self._connecting is None:
@@ -274,6 +269,9 @@ class TcpLink:
         self._clear()
         self._peer = peer
         self._say(f"connected on {self._address}")
+        # What was said while nobody listened was lost; a lockstep partner waits for exactly the last of it.
+        if self._last_sent:
+            self.send(self._last_sent)
 
     def _lose(self) -> None:
         assert self._peer is not None

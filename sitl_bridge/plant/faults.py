@@ -166,6 +166,11 @@ def checked(faults: Faults, vehicle: Vehicle) -> Faults:
         for index, fault in enumerate(faults.sensor)
         if fault.failure == "lost" and fault.sensor != "gps"
     ]
+    found += [
+        f"faults.sensor.{index}.sensor = 'tracker': {vehicle.name} has no [sensors.tracker]"
+        for index, fault in enumerate(faults.sensor)
+        if fault.sensor == "tracker" and vehicle.sensors.tracker is None
+    ]
     if found:
         raise DescriptionError("faults", found)
     return faults

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.plant.answers import (
     ANSWERED,
     ARMED,
@@ -18,10 +15,7 @@ from sitl_bridge.plant.answers import (
 )
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.state import Array
-
-STOPPED = np.zeros(ACTUATOR_CONTROLS)
-"""Controls of rotors at rest."""
+from sitl_bridge.plant.state import STOPPED, Array
 
 
 class HilReceiver:

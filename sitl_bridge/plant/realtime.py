@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections import deque
 
-from sitl_bridge.plant.link import STOPPED, HilReceiver
+from sitl_bridge.plant.lateness import Lateness
+from sitl_bridge.plant.link import HilReceiver
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.state import Array
+from sitl_bridge.plant.state import STOPPED, Array
 
 AUTOPILOT_TIMEOUT = 0.3
 """Silence after which the rotors stop, s."""
@@ -25,8 +26,8 @@ class Realtime:
         self.simulation = simulation
         self.late_ticks = 0
         """Ticks that began a whole period late or more, from the scenario's beginning on."""
-        self.lateness: list[float] = []
-        """By how much each tick of the scenario missed its deadline, s."""
+        self.lateness = Lateness()
+        """By how much the ticks of the scenario missed their deadlines."""
         self._receiver = HilReceiver(simulation, notices, instance)
         self._notices = notices
         self._deadline = 0.0  # of the next tick
@@ -90,7 +91,7 @@ class Realtime:
         period = self.simulation.period
         lateness = now - self._deadline
         if self.simulation.started:
-            self.lateness.append(lateness)
+            self.lateness.add(lateness)
         if lateness >= period:
             if self.simulation.started:
                 self.late_ticks += 1

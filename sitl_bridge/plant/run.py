@@ -8,13 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.mavlink.tlog import TlogWriter
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.plant.faulty_link import FaultyLink
+from sitl_bridge.plant.lateness import Lateness
 from sitl_bridge.plant.load_to import LoadTo
 from sitl_bridge.plant.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.notices import Notices
@@ -192,17 +191,15 @@ def _loop(
 def _outcome(
     options: PlantOptions, clock: Lockstep | Realtime, progress: Progress, stop: StopRequest
 ) -> dict[str, Any]:
-    lateness = np.array(clock.lateness if isinstance(clock, Realtime) else []) * 1e6
-    histogram = {
-        f"p{percent}": float(np.percentile(lateness, percent)) if lateness.size else None
-        for percent in (50, 99)
-    }
+    lateness = clock.lateness if isinstance(clock, Realtime) else Lateness()
+    late_s = {"p50": lateness.percentile(50), "p99": lateness.percentile(99)}
+    late_s["max"] = lateness.largest if lateness.ticks else None
     return {
         "completed": clock.finished,
         "stopped_by": stop.reason,
         "time_s": clock.simulation.scenario_time,
         "real_time_factor": progress.factor(clock.simulation),
-        "lateness_us": {**histogram, "max": float(lateness.max()) if lateness.size else None},
+        "lateness_us": {key: None if late is None else late * 1e6 for key, late in late_s.items()},
         "late_ticks": clock.late_ticks if isinstance(clock, Realtime) else 0,
         "resent_ticks": clock.resent_ticks if isinstance(clock, Lockstep) else 0,
         "unanswered_ticks": clock.unanswered_ticks if isinstance(clock, Lockstep) else 0,

@@ -35,6 +35,8 @@ COLUMNS = (
 """Log column of each element of the state, in order."""
 
 MOST_ROTORS = ACTUATOR_CONTROLS
+STOPPED = np.zeros(MOST_ROTORS)
+"""Controls of rotors at rest."""
 LEG_LANES = 4
 """Legs are worked out so many at a time."""
 LEG_BLOCKS = 2
@@ -42,8 +44,7 @@ MOST_LEGS = LEG_BLOCKS * LEG_LANES
 LOAD_CONTACT = MOST_LEGS  # number of the load's contact, after those of the legs
 CONTACTS = MOST_LEGS + 1
 
-ROTOR_SPEED = slice(0, MOST_ROTORS)
-"""rad/s."""
+# The inner state: rotor speeds (rad/s) come first.
 ANCHOR_EAST = MOST_ROTORS
 ANCHOR_NORTH = ANCHOR_EAST + CONTACTS
 """m, world: the point of the ground that each contact sticks to; east of all contacts, then north."""

@@ -30,14 +30,12 @@ from sitl_bridge.plant.state import (
     MOST_ROTORS,
     REACTIONS_SIZE,
     STATE_SIZE,
+    STOPPED,
     Array,
     initial_inner_state,
     initial_state,
 )
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
-
-STOPPED = (0.0,) * MOST_ROTORS
-"""Controls of rotors at rest."""
 
 SCHEDULE = np.dtype(
     [

@@ -13,17 +13,13 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
+from sitl.free_ports import free_ports
+
 PATIENCE = 120.0
 """Generous: two shared cores, perhaps with a compiler at work, s."""
 LOCKSTEP = common.HIL_ACTUATOR_CONTROLS_FLAGS_LOCKSTEP
 ARMED = common.MAV_MODE_FLAG_SAFETY_ARMED
 STATE_INTERVAL_US = 5000
-
-
-def free_port(kind: int) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 class Plant:
@@ -44,7 +40,7 @@ class Px4:
     def __init__(self, transport: str) -> None:
         self._reliable = transport == "tcp"
         kind = socket.SOCK_STREAM if self._reliable else socket.SOCK_DGRAM
-        self.port = free_port(kind)
+        [self.port] = free_ports(1, kind)
         self._socket = socket.socket(socket.AF_INET, kind)
         self._peer: Any = None
         if not self._reliable:

@@ -143,7 +143,7 @@ def radius(matrix: Array) -> float:
 def test_the_papers_gains_cannot_be_run_by_a_computer(
     rate_hz: float, delay: int, expected: float, digits: float
 ) -> None:
-    """Spectral radii of errata.md and design.md."""
+    """Spectral radii beyond 1 at rates that a computer manages (docs/paper.md)."""
     model, weights = integral_model(PAPER), paper_weights()
     sampled = sampled_model(model, weights, 1.0 / rate_hz)
     assert radius(delayed_loop(sampled, continuous_gain(model, weights), delay)) == pytest.approx(

@@ -126,6 +126,6 @@ def test_the_margin_is_where_the_radius_crosses_one() -> None:
 
 def test_margins_of_an_unstable_and_of_an_unshakeable_loop() -> None:
     near, far = FLEET["paper"], FLEET["paper, 10 m"]
-    # errata.md: gains for one length are unstable on the other.
+    # docs/paper.md: gains for one length are unstable on the other.
     assert delay_margin(actuated_model(far), design("paper", near, 250.0)) == 0.0
     assert delay_margin(actuated_model(near), design("default", near, 250.0), (3,), longest=0.01) == 0.01

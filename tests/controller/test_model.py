@@ -123,7 +123,7 @@ def test_only_the_pendulum_differs_at_the_true_equilibrium() -> None:
         *((6, 0), (6, 3), (7, 1), (7, 4)),
         *((9, 0), (9, 3), (10, 1), (10, 4)),
     ]
-    assert true[6, 3] == pytest.approx(4.952, abs=5e-4)  # errata.md
+    assert true[6, 3] == pytest.approx(4.952, abs=5e-4)  # docs/paper.md
 
 
 def rank(matrix: Vector) -> int:
@@ -148,7 +148,7 @@ def test_controllable_in_exact_arithmetic() -> None:
         blocks.append(a.dot(blocks[-1]))
         powers.append(a.dot(powers[-1]))
     assert rank(np.hstack(blocks)) == 18
-    assert rank(np.hstack([*powers[:-1], powers[-1].dot(b)])) == 14  # eq. 52 as printed (errata.md)
+    assert rank(np.hstack([*powers[:-1], powers[-1].dot(b)])) == 14  # eq. 52 as printed
 
 
 @pytest.mark.parametrize("vehicle", FLEET.values(), ids=FLEET)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 import subprocess
 import sys
 import time
@@ -12,17 +11,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-
-def free_udp_ports(count: int) -> list[int]:
-    """Ports that nobody has bound now."""
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    try:
-        for each in sockets:
-            each.bind(("127.0.0.1", 0))
-        return [each.getsockname()[1] for each in sockets]
-    finally:
-        for each in sockets:
-            each.close()
+from tests.loopback.patience import PATIENCE
 
 
 class Vehicle:
@@ -46,7 +35,7 @@ class Vehicle:
 
 
 @asynccontextmanager
-async def mavsdk_vehicle(connection: str, timeout: float = 10.0) -> AsyncIterator[Vehicle]:
+async def mavsdk_vehicle(connection: str, timeout: float = PATIENCE) -> AsyncIterator[Vehicle]:
     """A vehicle on a MAVSDK connection string (`udpin://0.0.0.0:14540`)."""
     from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
     from mavsdk.logging import log_subscribe
@@ -60,7 +49,9 @@ async def mavsdk_vehicle(connection: str, timeout: float = 10.0) -> AsyncIterato
         yield Vehicle(system)
 
 
-async def until(read: Callable[[], Any], holds: Callable[[Any], bool], timeout: float, what: str) -> Any:
+async def until(
+    read: Callable[[], Any], holds: Callable[[Any], bool], what: str, timeout: float = PATIENCE
+) -> Any:
     """Read until a condition holds."""
     deadline = time.monotonic() + timeout
     value = None
@@ -99,7 +90,7 @@ class MavProxy:
         """Everything it has printed."""
         return self.log.read_text(errors="replace")
 
-    def wait_for(self, text: str, timeout: float = 15.0, after: int = 0) -> int:
+    def wait_for(self, text: str, timeout: float = PATIENCE, after: int = 0) -> int:
         """Wait until it prints a text behind a position; returns the position behind that."""
         deadline = time.monotonic() + timeout
         while time.monotonic() < deadline:

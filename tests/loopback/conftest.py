@@ -6,7 +6,6 @@ import json
 import os
 import select
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from sitl.free_ports import free_ports
 
 PATIENCE = 120.0
 """Generous: two shared cores, perhaps with a compiler at work, s."""
@@ -98,9 +99,7 @@ def start() -> Iterator[Callable[..., Process]]:
 @pytest.fixture
 def port() -> int:
     """A free UDP port."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    return free_ports(1)[0]
 
 
 @pytest.fixture
@@ -111,9 +110,7 @@ def fly(start: Callable[..., Process], tmp_path: Path) -> Callable[..., dict[str
     def run(
         scenario: str, *arguments: str, clock: str = "lockstep", expect: int | None = 0
     ) -> dict[str, Any]:
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            free = probe.getsockname()[1]
+        [free] = free_ports(1)
         out = tmp_path / f"flight{next(flights)}"
         code, output, errors = start(
             *("fly", scenario, "--clock", clock, "--json", "--out", str(out)),

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
+from tests.loopback.patience import LONG_PATIENCE
 
 METRES_PER_DEGREE = 111_180.0
 
@@ -32,14 +33,13 @@ async def ready(vehicle: Vehicle) -> None:
     await until(
         vehicle.telemetry.health,
         lambda h: h.is_armable and h.is_global_position_ok and h.is_home_position_ok,
-        30,
         "armable",
     )
 
 
 async def information_and_parameters(vehicle: Vehicle) -> None:
     """Version, every parameter, set and refused."""
-    await until(vehicle.info.get_version, bool, 5, "version")
+    await until(vehicle.info.get_version, bool, "version")
     every = await vehicle.param.get_all_params()
     assert {"COM_RC_IN_MODE", "SYS_AUTOSTART"} <= {p.name for p in every.int_params}
     assert "MIS_TAKEOFF_ALT" in {p.name for p in every.float_params}
@@ -57,8 +57,10 @@ async def take_off(vehicle: Vehicle, altitude: float) -> None:
     await vehicle.action.set_takeoff_altitude(altitude)
     await vehicle.action.arm()
     await vehicle.action.takeoff()
-    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "TAKEOFF", 5, "take-off mode")
-    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "HOLD", 90, "hold after take-off")
+    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "TAKEOFF", "take-off mode")
+    await until(
+        vehicle.telemetry.flight_mode, lambda m: m.name == "HOLD", "hold after take-off", LONG_PATIENCE
+    )
     position = await vehicle.telemetry.position()
     assert abs(position.relative_altitude_m - altitude) < 0.5, position
 
@@ -74,7 +76,7 @@ async def go_to(vehicle: Vehicle, north: float, east: float, tolerance: float = 
         d_east = (p.longitude_deg - longitude) * math.cos(math.radians(latitude))
         return math.hypot(p.latitude_deg - latitude, d_east) * METRES_PER_DEGREE
 
-    await until(vehicle.telemetry.position, lambda p: away(p) < tolerance, 60, "arrival")
+    await until(vehicle.telemetry.position, lambda p: away(p) < tolerance, "arrival")
 
 
 async def three_waypoints(vehicle: Vehicle) -> None:
@@ -102,8 +104,8 @@ async def three_waypoints(vehicle: Vehicle) -> None:
         round(item.latitude_deg, 6) for item in plan.mission_items
     ]
     await vehicle.mission.start_mission()
-    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "MISSION", 5, "mission mode")
-    await until(vehicle.mission.is_mission_finished, bool, 120, "mission finished")
+    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "MISSION", "mission mode")
+    await until(vehicle.mission.is_mission_finished, bool, "mission finished", LONG_PATIENCE)
     await vehicle.mission.clear_mission()
     await refused(vehicle.mission.start_mission, "DENIED")
 
@@ -117,18 +119,16 @@ async def offboard(vehicle: Vehicle) -> None:
     await until(
         vehicle.telemetry.position_velocity_ned,
         lambda p: math.dist((p.position.north_m, p.position.east_m, p.position.down_m), (2, 1, -5)) < 0.5,
-        60,
         "offboard position",
     )
     await vehicle.offboard.set_velocity_ned(VelocityNedYaw(1.0, 0.0, 0.0, 0.0))
     await until(
         vehicle.telemetry.position_velocity_ned,
         lambda p: p.velocity.north_m_s > 0.7 and p.position.north_m > 3.0,
-        20,
         "offboard velocity",
     )
     await vehicle.offboard.stop()
-    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "HOLD", 5, "hold after offboard")
+    await until(vehicle.telemetry.flight_mode, lambda m: m.name == "HOLD", "hold after offboard")
 
 
 async def mavsdk_flight(connection: str) -> None:
@@ -143,7 +143,7 @@ async def mavsdk_flight(connection: str) -> None:
         await offboard(vehicle)
         await refused(vehicle.action.disarm, "DENIED")
         await vehicle.action.return_to_launch()
-        await until(vehicle.telemetry.armed, lambda armed: not armed, 120, "disarmed after return")
+        await until(vehicle.telemetry.armed, lambda armed: not armed, "disarmed after return", LONG_PATIENCE)
 
 
 WAYPOINTS = """QGC WPL 110
@@ -158,7 +158,7 @@ def mavproxy_flight(master: str, folder: Path) -> None:
     (folder / "plan.txt").write_text(WAYPOINTS)
     proxy = MavProxy(master, folder)
     try:
-        at = proxy.wait_for("Received ", 30)
+        at = proxy.wait_for("Received ")
         proxy.say("param set MIS_TAKEOFF_ALT 4.5")
         time.sleep(1.0)
         proxy.say("param show MIS_TAKEOFF_ALT")
@@ -175,14 +175,14 @@ def mavproxy_flight(master: str, folder: Path) -> None:
         at = proxy.wait_for("ARMED", after=at)
         proxy.say("long NAV_TAKEOFF 0 0 0 nan nan nan nan")
         at = proxy.wait_for("Mode TAKEOFF", after=at)
-        at = proxy.wait_for("Mode LOITER", 90, after=at)
+        at = proxy.wait_for("Mode LOITER", LONG_PATIENCE, after=at)
         proxy.say("long DO_SET_MODE 1 4 4")
-        at = proxy.wait_for("Mission finished", 120, after=at)
+        at = proxy.wait_for("Mission finished", LONG_PATIENCE, after=at)
         proxy.say("disarm")
         at = proxy.wait_for("in flight; land first", after=at)
         proxy.say("long DO_SET_MODE 1 4 6")
         at = proxy.wait_for("Mode LAND", after=at)
-        proxy.wait_for("DISARMED", 90, after=at)
+        proxy.wait_for("DISARMED", LONG_PATIENCE, after=at)
     finally:
         proxy.stop()
 

@@ -11,12 +11,12 @@ from typing import Any
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common as mavlink
 
+from tests.loopback.patience import LONG_PATIENCE, PATIENCE
+
 os.environ["MAVLINK20"] = "1"  # else pymavlink begins with MAVLink 1, and is answered in that
 mavutil.set_dialect("common")
 
-PATIENCE = 60.0
-"""s"""
-HOLD, RETURN, LAND, OFFBOARD = (4, 3), (4, 5), (4, 6), (6, 0)
+HOLD, LAND, OFFBOARD = (4, 3), (4, 6), (6, 0)
 """PX4's main and sub modes"""
 
 
@@ -67,6 +67,19 @@ class PyMav:
         while time.monotonic() < deadline:
             self.poll()
         return self.heard[begin:]
+
+    def let_pass(self, seconds: float, meanwhile: Callable[[], None] = lambda: None) -> None:
+        """Wait so many seconds on the vehicle's clock; meanwhile: called with every message."""
+        begin: list[int] = []
+
+        def over(message: Any) -> bool:
+            meanwhile()
+            if message.get_type() != "LOCAL_POSITION_NED" or message.get_srcSystem() != 1:
+                return False
+            begin.append(message.time_boot_ms)
+            return begin[-1] - begin[0] >= 1e3 * seconds
+
+        self.wait(over, f"{seconds:g} s of the vehicle's time", LONG_PATIENCE)
 
     def texts(self) -> list[str]:
         """STATUSTEXTs, pieces joined."""

@@ -20,12 +20,14 @@ from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.parameter_table import TABLE
-from sitl.testing import SimulatedVehicle, flying_vehicle, free_ports
+from sitl.free_ports import free_ports
+from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
 from tests.loopback.flights import ready, refused, take_off
 from tests.loopback.lossy import lossy_relay
+from tests.loopback.patience import LONG_PATIENCE, PATIENCE
 from tests.loopback.pymav import HOLD, LAND, OFFBOARD, PyMav
 
 
@@ -48,16 +50,16 @@ def test_three_clients_at_once_each_with_its_own_rates(tmp_path: Path) -> None:
             every = await sdk.param.get_all_params()
             assert len(every.int_params) + len(every.float_params) == len(TABLE)
             proxy.say("param fetch")
-            proxy.wait_for(f"Received {len(TABLE)} parameters", 60.0)
+            proxy.wait_for(f"Received {len(TABLE)} parameters")
             fast, usual = spacing_ms(third, "LOCAL_POSITION_NED"), spacing_ms(third, "ATTITUDE")
             assert usual / fast == pytest.approx(5.0, rel=0.3)  # 10 Hz and 50 Hz, for this one alone
             battery = await anext(sdk.telemetry.subscribe_battery())
             assert 10.0 < battery.voltage_v < 13.0  # the plant's own 3S pack
             # One arms, another sees it, the third disarms.
             proxy.say("arm throttle")
-            await until(sdk.telemetry.armed, bool, 20, "armed")
+            await until(sdk.telemetry.armed, bool, "armed")
             assert third.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0) == 0
-            await until(sdk.telemetry.armed, lambda armed: not armed, 20, "disarmed")
+            await until(sdk.telemetry.armed, lambda armed: not armed, "disarmed")
 
     with flying_vehicle(tmp_path / "vehicle") as vehicle:
         proxy = MavProxy(vehicle.mavproxy.replace("udpin", "udp"), tmp_path)
@@ -93,7 +95,7 @@ def all_parameters(client: PyMav) -> set[str]:
     client.link.mav.param_request_list_send(1, 1)
     found: dict[int, str] = {}
     lost = 0
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + PATIENCE
     while len(found) < len(TABLE):
         assert time.monotonic() < deadline, f"{len(found)} of {len(TABLE)}"
         for message in client.listen(0.5):
@@ -109,7 +111,7 @@ def all_parameters(client: PyMav) -> set[str]:
 async def mission_up_and_down(connection: str) -> None:
     from mavsdk.plugins.mission import MissionError, MissionItem, MissionPlan
 
-    async with mavsdk_vehicle(connection, 30.0) as vehicle:
+    async with mavsdk_vehicle(connection) as vehicle:
         await ready(vehicle)
         home = await vehicle.telemetry.position()
         items = [
@@ -142,7 +144,7 @@ def test_a_peer_that_speaks_mavlink_1_is_answered_in_mavlink_1(tmp_path: Path) -
         writer = mavlink1.MAVLink(None, srcSystem=250, srcComponent=190)
         reader = mavlink1.MAVLink(None)
         heard: dict[str, Any] = {}
-        deadline = time.monotonic() + 30.0
+        deadline = time.monotonic() + PATIENCE
         while not {"HEARTBEAT", "ATTITUDE", "PARAM_VALUE", "COMMAND_ACK"} <= set(heard):
             assert time.monotonic() < deadline, sorted(heard)
             for message in (
@@ -183,8 +185,8 @@ def test_a_failure_asked_for_with_mavsdk_happens_in_the_plant(tmp_path: Path) ->
             await refused(lambda: failure.inject(*unknown), "UNSUPPORTED|DENIED")
             await take_off(vehicle, 5.0)
             await failure.inject(FailureUnit.SYSTEM_MOTOR, FailureType.OFF, 1)
-            await until(vehicle.telemetry.flight_mode, lambda m: m.name != "HOLD", 20, "flight failed")
-            await until(vehicle.telemetry.position, lambda p: p.relative_altitude_m < 0.5, 20, "fallen")
+            await until(vehicle.telemetry.flight_mode, lambda m: m.name != "HOLD", "flight failed")
+            await until(vehicle.telemetry.position, lambda p: p.relative_altitude_m < 0.5, "fallen")
             listening.cancel()
 
     with flying_vehicle(tmp_path) as vehicle:
@@ -258,22 +260,31 @@ def test_a_stall_and_a_restart_of_the_controller_in_flight(start: Callable[..., 
         assert client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
         client.wait_until_in_air()
 
-        def send(seconds: float) -> None:
+        def send() -> None:
             position_only = 0xFF8
-            deadline = time.monotonic() + seconds
-            while time.monotonic() < deadline:
-                client.link.mav.set_position_target_local_ned_send(
-                    0, 1, 1, 1, position_only, 0.0, 1.0, -15.0, *[0.0] * 8
-                )
-                client.poll()
+            client.link.mav.set_position_target_local_ned_send(
+                0, 1, 1, 1, position_only, 0.0, 1.0, -15.0, *[0.0] * 8
+            )
 
-        send(0.3)
+        def arrived(message: Any) -> bool:
+            send()
+            return (
+                message.get_type() == "LOCAL_POSITION_NED"
+                and message.get_srcSystem() == 1
+                and abs(message.z + 15.0) < 0.3
+                and abs(message.vz) < 0.1
+            )
+
+        client.let_pass(0.3, send)
         assert client.command(mavlink.MAV_CMD_DO_SET_MODE, 1, *OFFBOARD) == 0
-        send(18.0)
+        client.wait(arrived, "15 m up", LONG_PATIENCE)
         os.kill(vehicle.controller.popen.pid, signal.SIGSTOP)
-        send(4.0)
+        stalled_until = time.monotonic() + 4.0  # the world waits: nothing is heard
+        while time.monotonic() < stalled_until:
+            send()
+            client.poll()
         os.kill(vehicle.controller.popen.pid, signal.SIGCONT)
-        send(2.0)
+        client.let_pass(2.0, send)
         client.wait_for_mode(OFFBOARD)
         assert not [text for text in client.texts() if text.startswith("No ")]
 
@@ -283,7 +294,7 @@ def test_a_stall_and_a_restart_of_the_controller_in_flight(start: Callable[..., 
         client.wait_for_mode(HOLD)
         # It falls while the estimate is aligned anew, with the rotors stopped, is caught some metres lower,
         # and goes back up to where it was found.
-        client.listen(10.0)
+        client.let_pass(10.0)
         held = client.wait_for("LOCAL_POSITION_NED")
         assert -15.5 < held.z < -8.0
         assert abs(held.vz) < 0.5
@@ -294,10 +305,10 @@ def test_a_stall_and_a_restart_of_the_controller_in_flight(start: Callable[..., 
 
 
 def test_open_links_are_warned_of(start: Callable[..., Process]) -> None:
-    hil, gcs, onboard = free_ports(3)
+    hil, gcs, gcs_peer, onboard, onboard_peer = free_ports(5)
     controller = start(
         *("controller", "--scenario", "hold", "--hil", f"udpin:127.0.0.1:{hil}", "--expose"),
-        *("--gcs", f"{gcs}:14550", "--onboard", f"{onboard}:14540"),
+        *("--gcs", f"{gcs}:{gcs_peer}", "--onboard", f"{onboard}:{onboard_peer}"),
     )
     controller.wait_for("warning: --expose opens the ground-control links to ANYBODY")
 

@@ -40,7 +40,7 @@ def test_the_same_seed_gives_the_same_logs_whatever_is_lost(fly: Fly) -> None:
 
 
 def test_setpoint_on_the_estimate(fly: Fly) -> None:
-    """Issue 6's limits for one short flight, with half as much again for a single seed."""
+    """The accuracy asked for, for one short flight, with half as much again for a single seed."""
     # The load stays within 30 cm, not within 2 % of the step: that is the GPS.
     summary = fly("setpoint", *ON_ESTIMATE, "--duration", "40", expect=1)
     assert summary["completed"]
@@ -64,7 +64,7 @@ def test_setpoint_on_the_estimate(fly: Fly) -> None:
 def test_the_estimator_beside_a_law_on_truth(
     rest_length: str, limit: tuple[float, float, float], fly: Fly
 ) -> None:
-    """Issue 6's limits, and near the linear bound; `scripts/estimator_table.py` flies 20 seeds."""
+    """The accuracy asked for, and near the linear bound; `scripts/estimator_table.py` flies 20 seeds."""
     summary = fly(
         "hover",
         *("--feedback", "truth", "--sensors", "consumer", "--set", "disturbance.force_std=5"),

@@ -7,7 +7,6 @@ import math
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,8 @@ from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Vehicle, mavsdk_vehicle, until
 from tests.loopback.flights import mavproxy_flight, mavsdk_flight, take_off
+from tests.loopback.patience import PATIENCE
+from tests.loopback.pymav import PyMav
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LOCKSTEP = ("--clock", "lockstep", "--speed", "1")
@@ -63,7 +64,7 @@ async def _square(connection: str, side: float, height: float) -> None:
             await _arrive(vehicle, (north, east, -height))
         await vehicle.offboard.stop()
         await vehicle.action.land()
-        await until(vehicle.telemetry.armed, lambda armed: not armed, 60, "landed")
+        await until(vehicle.telemetry.armed, lambda armed: not armed, "landed")
 
 
 async def _arrive(vehicle: Vehicle, place: tuple[float, float, float]) -> None:
@@ -72,7 +73,7 @@ async def _arrive(vehicle: Vehicle, place: tuple[float, float, float]) -> None:
         away = math.dist((position.north_m, position.east_m, position.down_m), place)
         return away < 0.05 and math.hypot(velocity.north_m_s, velocity.east_m_s) < 0.05
 
-    await until(vehicle.telemetry.position_velocity_ned, there, 30, f"corner {place}")
+    await until(vehicle.telemetry.position_velocity_ned, there, f"corner {place}")
 
 
 def test_an_offboard_square_without_swing_or_overshoot(
@@ -101,37 +102,18 @@ def test_an_offboard_square_without_swing_or_overshoot(
     assert largest < 20.0
 
 
-def _texts(link: Any, until_text: str, timeout: float) -> list[str]:
-    """STATUSTEXTs until one contains a text (pieces put together)."""
-    said: list[str] = []
-    pieces = ""
-    deadline = time.monotonic() + timeout
-    while time.monotonic() < deadline:
-        link.mav.heartbeat_send(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0)
-        message = link.recv_match(type="STATUSTEXT", blocking=True, timeout=0.5)
-        if message is None:
-            continue
-        pieces += message.text
-        if message.id == 0 or len(message.text) < 50:
-            said.append(pieces)
-            pieces = ""
-            if until_text in said[-1]:
-                return said
-    raise AssertionError(f"nobody said {until_text!r}: {said}")
-
-
 def test_refusals_say_why(tmp_path: Path) -> None:
     with flying_vehicle(tmp_path) as vehicle:
-        link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=245)
-        assert link.wait_heartbeat(timeout=20) is not None
+        client = PyMav(vehicle.mavproxy)
+        client.wait_for("HEARTBEAT")
         for number, parameters, text in (
             (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 1.0), "needs a remote control"),
             (mavlink.MAV_CMD_MISSION_START, (), "upload one first"),
             (mavlink.MAV_CMD_DO_REPOSITION, (-1.0,), "take off first"),
         ):
-            link.mav.command_long_send(1, 1, number, 0, *parameters, *[math.nan] * (7 - len(parameters)))
-            _texts(link, text, 5.0)
-        link.close()
+            client.command(number, *parameters)
+            client.wait_for_text(text)
+        client.close()
     assert "armed" not in vehicle.log.read_text()
 
 
@@ -142,11 +124,11 @@ def test_new_weights_are_taken_in_flight(tmp_path: Path) -> None:
             await vehicle.param.set_param_float("LQR_Q_LPOS", 4.0)
 
     with flying_vehicle(tmp_path, (*LOCKSTEP, "--feedback", "truth")) as vehicle:  # stillness is the law's
-        link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=244)
+        client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(to_height(vehicle.mavsdk))
-        _texts(link, "New weights fly", 60.0)
-        time.sleep(2.0)
-        link.close()
+        client.wait_for_text("New weights fly")
+        client.let_pass(2.0)
+        client.close()
     flown = swing.read(vehicle.state_log)
     still = flown.between(float(flown.time[-1]) - 1.0, 1e9)
     assert np.ptp(still.load, axis=0).max() < 0.02
@@ -159,13 +141,13 @@ def test_signed_links_ignore_the_unsigned(tmp_path: Path) -> None:
     arguments = (*LOCKSTEP, "--signing-key", str(key))
     with flying_vehicle(tmp_path / "vehicle", arguments) as vehicle:
         link = mavutil.mavlink_connection(vehicle.mavproxy, source_system=245)
-        link.wait_heartbeat(timeout=20)  # pymavlink without a key takes what is signed
+        link.wait_heartbeat(timeout=PATIENCE)  # pymavlink without a key takes what is signed
         unsigned = (1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1.0, *[math.nan] * 6)
         link.mav.command_long_send(*unsigned)
         assert link.recv_match(type="COMMAND_ACK", blocking=True, timeout=2) is None
         link.setup_signing(bytes.fromhex(key.read_text()), sign_outgoing=True)
         link.mav.command_long_send(*unsigned)
-        ack = link.recv_match(type="COMMAND_ACK", blocking=True, timeout=5)
+        ack = link.recv_match(type="COMMAND_ACK", blocking=True, timeout=PATIENCE)
         assert ack is not None
         assert ack.result == mavlink.MAV_RESULT_ACCEPTED
         link.close()

@@ -219,11 +219,18 @@ def test_failures_are_injected_over_mavlink(unit: int, result: int, stopped: int
 def test_a_fault_that_the_vehicle_cannot_have_is_refused() -> None:
     table = {
         "rotor": [{"rotor": 5, "at": 1.0}],
-        "sensor": [{"sensor": "barometer", "failure": "lost", "at": 1.0}],
+        "sensor": [
+            {"sensor": "barometer", "failure": "lost", "at": 1.0},
+            {"sensor": "tracker", "failure": "off", "at": 1.0},
+        ],
     }
     with pytest.raises(DescriptionError) as refused:
         checked(validated(Faults, table, "test"), load_vehicle("iris"))
     assert refused.value.faults == [
         "faults.rotor.0.rotor = 5: iris has rotors 1 to 4",
         "faults.sensor.0.failure = 'lost': for gps only",
+        "faults.sensor.1.sensor = 'tracker': iris has no [sensors.tracker]",
     ]
+    fitted = load_vehicle("iris", ["sensors.tracker.rate=20"])
+    faults = validated(Faults, {"sensor": table["sensor"][1:]}, "test")
+    assert checked(faults, fitted) is faults

@@ -319,6 +319,30 @@ def test_tracker_sees_the_load_in_the_body() -> None:
     assert all(camera.sample(tick, x) is None for tick in range(60, 90))
 
 
+@pytest.mark.parametrize("doing", [WORKS, OFF, STUCK, WRONG, GARBAGE])
+def test_tracker_fails(doing: int) -> None:
+    """The load moves 0.25 m forward from sighting to sighting; the fault begins after the second."""
+    camera, x = LoadTracker(Tracker(rate=25.0, range=5.0), 1.0 / RATE, 1), np.zeros(STATE_SIZE)
+    x[6], x[15] = 1.0, -2.0
+    seen = []
+    for tick in range(50):
+        camera.doing = doing if tick > 15 else WORKS
+        x[13] = tick / 40.0
+        if (sighting := camera.sample(tick, x)) is not None:
+            seen.append(sighting.position)
+    begin, end = seen[:2], np.array(seen[2:])
+    np.testing.assert_allclose(begin, [(0.0, 0.0, -2.0), (0.25, 0.0, -2.0)], atol=1e-12)
+    true = np.array([(forward, 0.0, -2.0) for forward in (0.5, 0.75, 1.0)])
+    if doing == OFF:
+        assert not len(end)
+    elif doing == GARBAGE:
+        assert np.all(np.abs(end) <= 5.0)
+        assert np.all(np.linalg.norm(end - true, axis=1) > 0.1)
+    else:
+        expected = {WORKS: true, STUCK: [begin[1]] * 3, WRONG: true + np.array([0.5, 0.0, 0.0])}
+        np.testing.assert_allclose(end, expected[doing], atol=1e-12)
+
+
 def test_tracker_noise() -> None:
     camera = LoadTracker(Tracker(rate=200.0, angle_noise=0.01, distance_noise=0.03), 1.0 / RATE, 1)
     x = np.zeros(STATE_SIZE)

@@ -64,6 +64,22 @@ def test_a_row_that_was_lost_shifts_nothing(logs: tuple[Log, Log, Log]) -> None:
     assert parts["load_relative_rms_m"] == pytest.approx(whole["load_relative_rms_m"], rel=0.01)
 
 
+@pytest.mark.filterwarnings("error")
+def test_what_no_row_tells_is_none(logs: tuple[Log, Log, Log]) -> None:
+    state, estimate, covariance = logs
+    load = np.stack([state[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    early = {name: column[:1] for name, column in covariance.items()}
+    assert estimate_metrics(state, estimate, early, load)["nees_mean"] is None
+    empty = {name: column[:0] for name, column in estimate.items()}
+    figures = estimate_metrics(state, empty, {name: column[:0] for name, column in covariance.items()}, load)
+    assert figures == {
+        "load_relative_rms_m": None,
+        "load_rms_m": [0.0, 0.0, 0.0],
+        "nees_mean": None,
+        "innovations_in_bounds": None,
+    }
+
+
 def test_angles_differ_the_short_way_round() -> None:
     truth, estimate = np.zeros((1, 18)), np.zeros((1, 18))
     truth[0, 17], estimate[0, 17] = 3.1, -3.1

@@ -9,10 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl_bridge.frames import Quaternion, Triple, rotate_inverse
-from sitl_bridge.plant.sensors.instruments import WORKS
+from sitl_bridge.plant.sensors.instruments import GARBAGE, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
 from sitl_bridge.plant.streams import stream
 from sitl_bridge.sensors import Tracker
+
+WRONG_BY = 0.5
+"""m, forward, of a wrong camera."""
 
 
 class Sighting(NamedTuple):
@@ -41,6 +44,26 @@ def sighting(tracker: Tracker, x: Array, draw: Array, delay: float) -> Sighting 
     return Sighting((px, py, pz), delay)
 
 
+def spoil(
+    seen: Sighting | None, doing: int, last: Sighting | None, reach: float, draw: Array, delay: float
+) -> Sighting | None:
+    """What a failing camera makes of what it sees; None: nothing.
+
+    last: what it showed before; reach: of garbage, m; draw (3,): uniform in ±1; delay: of garbage, s.
+    """
+    if doing == OFF:
+        return None
+    if doing == STUCK:
+        return last or seen
+    if doing == GARBAGE:
+        x, y, z = (reach * draw).tolist()
+        return Sighting((x, y, z), delay)
+    if doing == WRONG and seen is not None:
+        x, y, z = seen.position
+        return seen._replace(position=(x + WRONG_BY, y, z))
+    return seen
+
+
 class LoadTracker:
     """The camera in time: `sample` at every tick gives the sighting that arrives then, if one does."""
 
@@ -49,16 +72,22 @@ class LoadTracker:
         self.every = max(1, round(1.0 / (tracker.rate * tick_period)))
         self.late = round(tracker.delay / tick_period)
         self.doing = WORKS
-        """What the camera does, as of the instruments: anything but WORKS, and it sees nothing."""
+        """What the camera does, as of the instruments; set by faults."""
         self._delay = self.late * tick_period
         self._under_way: deque[tuple[int, Sighting]] = deque()
+        self._last: Sighting | None = None
         self._white = stream(seed, "tracker.white")
+        self._garbage = stream(seed, "tracker.garbage")
 
     def sample(self, tick: int, x: Array) -> Sighting | None:
         """The sighting that arrives at `tick` (counted from 0 or 1, each once)."""
         if tick % self.every == 0:
             seen = sighting(self.tracker, x, self._white.standard_normal(3), self._delay)
-            if seen is not None and self.doing == WORKS:
+            if self.doing != WORKS:
+                garbage = self._garbage.uniform(-1.0, 1.0, 3)
+                seen = spoil(seen, self.doing, self._last, self.tracker.range, garbage, self._delay)
+            if seen is not None:
+                self._last = seen
                 self._under_way.append((tick + self.late, seen))
         if self._under_way and self._under_way[0][0] <= tick:
             return self._under_way.popleft()[1]

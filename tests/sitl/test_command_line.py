@@ -1,0 +1,116 @@
+"""What `sitl` says before anything flies: one line for each fault, and exit code 2."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sitl import bench, cli
+from sitl.flight import new_folder
+from sitl.fly import FlightError
+from sitl.report import table, write_report
+
+SCENARIO = """
+vehicle = "iris"
+set = ["cable.rest_length=1.2"]
+[reference]
+kind = "{kind}"
+"""
+
+
+def refused(*arguments: str, cwd: Path | None = None) -> list[str]:
+    """Lines on standard error of a command that has to be refused."""
+    done = subprocess.run(
+        [sys.executable, "-m", "sitl", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 2, done.stderr
+    assert not done.stdout
+    return done.stderr.splitlines()
+
+
+@pytest.mark.parametrize("flag", ["--set", "--plant-set"])
+def test_a_faulty_override_is_reported_under_its_flag(flag: str) -> None:
+    [line] = refused("fly", "setpoint", flag, "cable")
+    assert line.startswith(f"{flag}: 'cable': expected KEY=VALUE")
+
+
+@pytest.mark.parametrize("key", ["set", "plant_set"])
+def test_a_faulty_override_is_reported_under_the_scenarios_key(key: str, tmp_path: Path) -> None:
+    text = SCENARIO.format(kind="hover").replace("\n[", f'\n{key} = ["load.mass=0.4", "cable"]\n[')
+    file = tmp_path / "mine.toml"
+    file.write_text(text if key != "set" else text.replace('set = ["cable.rest_length=1.2"]\n', "", 1))
+    [line] = refused("fly", str(file))
+    assert line.startswith(f"scenario: {key}.1: 'cable': expected KEY=VALUE")
+
+
+@pytest.mark.parametrize("command", [("fly", "hover"), ("controller",), ("plant",)])
+def test_rotors_that_give_no_yaw_are_refused_before_launch(command: tuple[str, ...]) -> None:
+    changes = [f"rotors.{i}.{change}" for i in range(4) for change in ("torque_coefficient=0",)]
+    [line] = refused(*command, "--vehicle", "iris", *(word for text in changes for word in ("--set", text)))
+    assert line.startswith("iris: rotors: they cannot give thrust and all three moments")
+
+
+@pytest.mark.parametrize("kind", ["hover", "ground-control"])
+def test_a_fault_that_the_vehicle_cannot_have_is_refused_before_launch(kind: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(SCENARIO.format(kind=kind) + "[[faults.rotor]]\nrotor = 5\nat = 1.0\n")
+    [line] = refused("fly", str(file), cwd=tmp_path)
+    assert line == "faults: faults.rotor.0.rotor = 5: iris has rotors 1 to 4"
+    assert not (tmp_path / "runs").exists()
+
+
+def test_no_summary_of_a_flight_that_is_left_to_ground_control() -> None:
+    [line] = refused("fly", "hold", "--json")
+    assert line.startswith("--json: under ground control")
+
+
+def test_a_controller_has_no_duration_of_its_scenario(capsys: pytest.CaptureFixture[str]) -> None:
+    for command, says in (("controller", "(default: until stopped)"), ("plant", "the scenario's, or until")):
+        with pytest.raises(SystemExit):
+            cli.main([command, "--help"])
+        assert says in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_failed_flight_of_the_bench_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(repeats: int) -> None:
+        raise FlightError("the plant ended with exit code 2; the controller was stopped")
+
+    monkeypatch.setattr(bench, "bench", fails)
+    assert cli.main(["bench", "--repeats", "1"]) == 1
+    assert capsys.readouterr().err == "bench: the plant ended with exit code 2; the controller was stopped\n"
+
+
+def test_two_flights_in_one_second_get_a_folder_each(tmp_path: Path) -> None:
+    wanted = tmp_path / "runs" / "hover-20260101-120000"
+    made = [new_folder(wanted) for _ in range(3)]
+    assert [folder.name for folder in made] == [wanted.name, f"{wanted.name}-2", f"{wanted.name}-3"]
+    assert all(folder.is_dir() for folder in made)
+
+
+def test_the_table_leaves_out_what_a_failed_flight_does_not_tell() -> None:
+    said = table({"settled": False, "failure": "the plant was killed by SIGKILL"})
+    assert "None" not in said
+    assert "late" not in said
+    assert "late ticks                0" in table({"settled": True, "late_ticks": 0})
+
+
+def test_a_summary_is_json_whatever_happened(tmp_path: Path) -> None:
+    def no_constant(name: str) -> None:
+        raise AssertionError(name)
+
+    facts = {"completed": False, "real_time_factor": float("nan"), "bound": np.array([1.0, np.inf])}
+    write_report(tmp_path, facts, None)
+    summary = json.loads((tmp_path / "summary.json").read_text(), parse_constant=no_constant)
+    assert summary == {"completed": False, "real_time_factor": None, "bound": [1.0, None], "settled": False}
