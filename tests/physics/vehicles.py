@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
+from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.parameters import Parameters, parameters
 from sitl_bridge.plant.state import (
     ATTITUDE,
@@ -18,7 +19,7 @@ from sitl_bridge.plant.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle import Rotor, Vehicle
 from tests.physics.stepping import Array
 
 
@@ -40,15 +41,8 @@ def vector(largest: float) -> st.SearchStrategy[tuple[float, float, float]]:
 @st.composite
 def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: bool = False) -> Case:
     """A random vehicle of 4 to 8 rotors with its load, from 0.9 (slack: 0.5) to 1.5 rest lengths away."""
-    rotors = draw(st.integers(4, 8))
-    description: dict[str, Any] = {
-        "name": "random",
-        "gravity": draw(st.floats(1, 15)),
-        "airframe": {
-            "mass": draw(st.floats(0.5, 20)),
-            "inertia": draw(st.tuples(*[st.floats(0.1, 1)] * 3)),
-        },
-        "rotors": tuple(
+    rotors = tuple(
+        Rotor.model_validate(
             {
                 "position": draw(vector(1)),
                 "direction": draw(st.sampled_from(["cw", "ccw"])),
@@ -56,8 +50,17 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
                 "torque_coefficient": draw(st.floats(0, 0.05)),
                 "max_speed": 1e4,
             }
-            for _ in range(rotors)
-        ),
+        )
+        for _ in range(draw(st.integers(4, 8)))
+    )
+    description: dict[str, Any] = {
+        "name": "random",
+        "gravity": draw(st.floats(1, 15)),
+        "airframe": {
+            "mass": draw(st.floats(0.5, 20)),
+            "inertia": draw(st.tuples(*[st.floats(0.1, 1)] * 3)),
+        },
+        "rotors": load_vehicle("paper").rotors,
         "cable": {
             "stiffness": draw(st.floats(20, 500)),
             "damping": draw(st.floats(0, 20)),
@@ -66,7 +69,9 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
         },
         "load": {"mass": draw(st.floats(0.5, 20))},
     }
-    vehicle = Vehicle.model_validate(description)
+    # Laws of physics hold for any rotors, also for such as no description may have, since nothing could
+    # be steered with them.
+    vehicle = Vehicle.model_validate(description).model_copy(update={"rotors": rotors})
     polar, azimuth = draw(st.floats(0, math.pi)), draw(st.floats(-math.pi, math.pi))
     along = np.array(
         [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
@@ -80,6 +85,6 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
     stretch = draw(st.floats(0.5 if slack else 0.9, 1.5))
     state[LOAD_POSITION] = state[VEHICLE_POSITION] + stretch * vehicle.cable.rest_length * along
     state[LOAD_VELOCITY] = draw(vector(2))
-    speeds = [draw(st.floats(0, 20)) if powered else 0.0 for _ in range(rotors)]
+    speeds = [draw(st.floats(0, 20)) if powered else 0.0 for _ in rotors]
     force = draw(st.tuples(*[st.floats(-10, 10)] * 6)) if powered else (0.0,) * 6
     return Case(vehicle, parameters(vehicle), state, np.array(speeds), np.array(force))
