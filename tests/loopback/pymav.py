@@ -111,13 +111,16 @@ class PyMav:
         self.link.mav.param_set_send(1, 1, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32)
         self.wait(lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == name, name)
 
-    def wait_for_mode(self, mode: tuple[int, int]) -> None:
-        """Wait until the vehicle's HEARTBEAT shows a mode."""
+    def wait_for_mode(self, mode: tuple[int, int], meanwhile: Callable[[], None] = lambda: None) -> None:
+        """Wait until the vehicle's HEARTBEAT shows a mode; meanwhile: called with every message."""
         number = mode[0] << 16 | mode[1] << 24
-        self.wait(
-            lambda m: m.get_type() == "HEARTBEAT" and m.get_srcSystem() == 1 and m.custom_mode == number,
-            f"mode {mode}",
-        )
+
+        def shown(message: Any) -> bool:
+            meanwhile()
+            is_heartbeat = message.get_type() == "HEARTBEAT" and message.get_srcSystem() == 1
+            return is_heartbeat and message.custom_mode == number
+
+        self.wait(shown, f"mode {mode}")
 
     def wait_until_disarmed(self) -> None:
         """Wait until the vehicle's HEARTBEAT says so."""
