@@ -53,6 +53,7 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
         )
         for _ in range(draw(st.integers(4, 8)))
     )
+    strong = tuple(rotor.model_copy(update={"max_speed": 1e4}) for rotor in load_vehicle("paper").rotors)
     description: dict[str, Any] = {
         "name": "random",
         "gravity": draw(st.floats(1, 15)),
@@ -60,7 +61,7 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
             "mass": draw(st.floats(0.5, 20)),
             "inertia": draw(st.tuples(*[st.floats(0.1, 1)] * 3)),
         },
-        "rotors": load_vehicle("paper").rotors,
+        "rotors": strong,
         "cable": {
             "stiffness": draw(st.floats(20, 500)),
             "damping": draw(st.floats(0, 20)),
