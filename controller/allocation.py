@@ -77,6 +77,9 @@ def _fitting_share(p: Any, base: Array, extra: Array) -> float:
 def allocate(p: Any, wrench: Array, controls: Array, achieved: Array, scratch: Array) -> bool:
     """Rotor commands for a wrench; where it does not fit, roll and pitch come first, then thrust, then yaw.
 
+    Each in turn, so that what comes first depends in no way on what comes later: the commands stay a
+    continuous function of the wrench, and yaw is never counted on to make room.
+
     p: allocation record; wrench: (4,), N and N m; controls: (16,), written, 0..1 and proportional to speed;
     achieved: (4,), written, the wrench that the limited rotors give; scratch: (2, 16).
     Returns whether a limit was met.
