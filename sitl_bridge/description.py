@@ -77,10 +77,24 @@ def load_vehicle(name_or_file: str, overrides: Iterable[str | Override] = ()) ->
     source, content = read_toml(name_or_file, resources.files(__package__) / "vehicles", "vehicle")
     for override in overrides:
         apply_override(content, override if isinstance(override, Override) else Override(override))
-    if isinstance(sensors := content.get("sensors"), dict) and "preset" in sensors:
-        _, preset = read_toml(str(sensors["preset"]), resources.files(__package__) / "presets", "preset")
-        content["sensors"] = _merged(preset, sensors)
+    if isinstance(sensors := content.get("sensors"), dict):
+        content["sensors"] = _on_preset(sensors)
     return validated(Vehicle, content, source)
+
+
+def _on_preset(sensors: dict[str, Any]) -> dict[str, Any]:
+    """The sensors' table on top of the preset that it names, and that on top of its own."""
+    names: list[str] = []
+    complete = sensors
+    below = sensors
+    while "preset" in below:
+        name = str(below["preset"])
+        if name in names:
+            raise DescriptionError(name, [f"preset: stands on itself ({' on '.join([*names, name])})"])
+        names.append(name)
+        _, below = read_toml(name, resources.files(__package__) / "presets", "preset")
+        complete = _merged(below, complete)
+    return complete
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """What sensors a vehicle carries and how well they measure: the same figures for plant and estimator.
 
-A preset (`presets/*.toml`, each figure with its source) fills the whole table; `sensors.preset = "urban"`
-takes one, and any other key changes that preset (`--set sensors.gps.rate=5`). Without a preset the sensors
-are ideal, but for the last digits of the magnetometer. Noise is given as density, so that it does not
-depend on the rate.
+A preset (`presets/*.toml`, each figure with its source) fills the whole table, perhaps on top of another
+preset; `sensors.preset = "urban"` takes one, and any other key changes it (`--set sensors.gps.rate=5`).
+Without a preset the sensors are ideal, but for the last digits of the magnetometer. Noise is given as
+density, so that it does not depend on the rate.
 """
 
 from __future__ import annotations

@@ -194,3 +194,23 @@ def test_a_file_that_cannot_be_read(name: str, tmp_path: Path) -> None:
     (tmp_path / "latin-1.toml").write_bytes('name = "Z\xfcrich"'.encode("latin-1"))
     (line,) = faults(source=str(tmp_path / name))
     assert "cannot be read" in line
+
+
+def test_a_preset_of_ones_own_stands_on_another(tmp_path: Path) -> None:
+    """What it does not say is that of the preset below; what the vehicle says stands above both."""
+    mine = tmp_path / "mine.toml"
+    mine.write_text('preset = "rtk"\n[gps]\nrate = 5\nsatellites = 30\n')
+    changed = load_vehicle("iris", [f"sensors.preset={mine}", "sensors.gps.satellites=11"]).sensors
+    rtk = load_vehicle("iris", ["sensors.preset=rtk"]).sensors
+    assert changed.preset == str(mine)
+    assert changed.gps == rtk.gps.model_copy(update={"rate": 5.0, "satellites": 11})
+    assert changed.accelerometer == rtk.accelerometer
+
+
+def test_a_preset_that_stands_on_itself_is_refused(tmp_path: Path) -> None:
+    one, two = tmp_path / "one.toml", tmp_path / "two.toml"
+    one.write_text(f'preset = "{two}"\n')
+    two.write_text(f'preset = "{one}"\n')
+    (line,) = faults(f"sensors.preset={one}")
+    assert "stands on itself" in line
+    assert str(two) in line
