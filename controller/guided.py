@@ -34,7 +34,8 @@ from controller.state import (
 )
 from controller.step import control_step
 from controller.trajectory import Limits, Trajectory
-from sitl_bridge.frames import Triple, quaternion_from_euler
+from sitl_bridge.frames import CENTIAMPERES_PER_AMPERE, PERCENT, Triple, quaternion_from_euler
+from sitl_bridge.mavlink.fields import pack_voltage
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.mavlink.hil import HIL_GPS
 from sitl_bridge.vehicle import Vehicle
@@ -64,9 +65,6 @@ WEIGHTS = {
     "LQR_R_MOMENT": "moments",
 }
 """Parameters that weigh the designs, and what of `Emphasis` they are."""
-
-
-UNMEASURED_CELL = 0xFFFF
 
 
 class Redesigner(Protocol):
@@ -146,11 +144,10 @@ class GuidedAutopilot:
             battery = decoded(frame)
             if battery is None:
                 return
-            measured = [volts for volts in battery.voltages if volts != UNMEASURED_CELL]
-            self._view.battery_voltage = sum(measured) * 1e-3 if measured else math.nan
+            self._view.battery_voltage = pack_voltage(battery.voltages)
             current, remaining = battery.current_battery, battery.battery_remaining
-            self._view.battery_current = current * 1e-2 if current >= 0 else math.nan
-            self._view.battery_remaining = remaining * 1e-2 if remaining >= 0 else math.nan
+            self._view.battery_current = current / CENTIAMPERES_PER_AMPERE if current >= 0 else math.nan
+            self._view.battery_remaining = remaining / PERCENT if remaining >= 0 else math.nan
 
     def wait(self, now: float) -> None:
         """No tick has come: the failsafes go on."""

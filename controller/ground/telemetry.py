@@ -17,11 +17,15 @@ from controller.ground.targets import Body, Follow, Goto, Land
 from controller.ground.view import VehicleView
 from controller.ground.wire import AvailableModes, CurrentMode
 from sitl_bridge.frames import (
+    CENTIAMPERES_PER_AMPERE,
     CENTIDEGREES_PER_RADIAN,
     CENTIMETRES_PER_METRE,
     DEG_E7_PER_DEG,
     MICROSECONDS_PER_SECOND,
     MILLIMETRES_PER_METRE,
+    MILLISECONDS_PER_SECOND,
+    MILLIVOLTS_PER_VOLT,
+    PERCENT,
     Geodetic,
     Triple,
     attitude_to_ned_frd,
@@ -30,6 +34,14 @@ from sitl_bridge.frames import (
     flu_to_frd,
     heading_from_yaw,
     rotate_inverse,
+)
+from sitl_bridge.mavlink.fields import (
+    CELLS,
+    FURTHER_CELLS,
+    NOT_KNOWN_INT16,
+    NOT_KNOWN_UINT16,
+    pack_voltages,
+    whole,
 )
 
 CAPABILITIES = (
@@ -58,25 +70,11 @@ _BATTERY = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
 _FENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
-_CELLS, _FURTHER_CELLS = 10, 4
-"""Fields of BATTERY_STATUS.voltages and .voltages_ext"""
-_NO_CELL = 0xFFFF
-
 Builder = Callable[[Machine, VehicleView], Any]
 
 
-def whole(value: float, bits: int, signed: bool = True, unknown: int | None = None) -> int:
-    """An integer field: rounded, kept within the field; what is not finite is `unknown` (or 0)."""
-    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
-    if not math.isfinite(value):
-        if math.isnan(value) or unknown is not None:
-            return unknown or 0
-        return high if value > 0 else low
-    return max(low, min(high, round(value)))
-
-
 def _milliseconds(view: VehicleView) -> int:
-    return int(view.time * 1e3) & 0xFFFFFFFF
+    return int(view.time * MILLISECONDS_PER_SECOND) & 0xFFFFFFFF
 
 
 def _microseconds(view: VehicleView) -> int:
@@ -145,10 +143,10 @@ def _gps_raw(machine: Machine, view: VehicleView) -> Any:
         gps.fix_type,
         *((0, 0, 0) if gps.position is None else _wire_place(gps.position)),
         # Dilution of precision times 100: of receivers with 1 m at a dilution of 1.
-        whole(gps.horizontal_accuracy * 100, 16, signed=False, unknown=0xFFFF),
-        whole(gps.vertical_accuracy * 100, 16, signed=False, unknown=0xFFFF),
-        whole(math.hypot(east, north) * CENTIMETRES_PER_METRE, 16, signed=False, unknown=0xFFFF),
-        0xFFFF if math.isnan(course) else whole(course, 16, signed=False) % 36000,
+        whole(gps.horizontal_accuracy * 100, 16, signed=False, unknown=NOT_KNOWN_UINT16),
+        whole(gps.vertical_accuracy * 100, 16, signed=False, unknown=NOT_KNOWN_UINT16),
+        whole(math.hypot(east, north) * CENTIMETRES_PER_METRE, 16, signed=False, unknown=NOT_KNOWN_UINT16),
+        NOT_KNOWN_UINT16 if math.isnan(course) else whole(course, 16, signed=False) % 36000,
         gps.satellites,
         h_acc=whole(gps.horizontal_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
         v_acc=whole(gps.vertical_accuracy * MILLIMETRES_PER_METRE, 32, signed=False),
@@ -161,7 +159,7 @@ def _vfr_hud(machine: Machine, view: VehicleView) -> Any:
         math.hypot(*view.velocity),
         speed,
         whole(math.degrees(_heading(view)), 16) % 360,
-        whole(100 * view.throttle, 16, signed=False),
+        whole(view.throttle * PERCENT, 16, signed=False),
         machine.profile.origin.home.altitude + view.position[2],
         view.velocity[2],
     )
@@ -185,9 +183,9 @@ def _sys_status(machine: Machine, view: VehicleView) -> Any:
         present,
         healthy,
         0,  # load: in lockstep the loop's share of the processor says nothing about the vehicle
-        whole(1000 * view.battery_voltage, 16, signed=False, unknown=0xFFFF),
-        whole(100 * view.battery_current, 16, unknown=-1),
-        whole(100 * view.battery_remaining, 8, unknown=-1),
+        whole(view.battery_voltage * MILLIVOLTS_PER_VOLT, 16, signed=False, unknown=NOT_KNOWN_UINT16),
+        whole(view.battery_current * CENTIAMPERES_PER_AMPERE, 16, unknown=-1),
+        whole(view.battery_remaining * PERCENT, 8, unknown=-1),
         *(0,) * 6,
     )
 
@@ -219,16 +217,15 @@ def _altitude(machine: Machine, view: VehicleView) -> Any:
 def cell_voltages(pack: float, cells: int) -> tuple[list[int], list[int]]:
     """BATTERY_STATUS.voltages and .voltages_ext, mV, of a pack (V, NaN: not known) that is shared evenly."""
     if not math.isfinite(pack):
-        return [_NO_CELL] * _CELLS, [0] * _FURTHER_CELLS
-    if cells <= _CELLS + _FURTHER_CELLS:
-        each = whole(1000 * pack / cells, 16, signed=False)
-        first, further = ([each] * cells)[:_CELLS], ([each] * cells)[_CELLS:]
-        no_cells, no_further = [_NO_CELL] * (_CELLS - len(first)), [0] * (_FURTHER_CELLS - len(further))
-        return first + no_cells, further + no_further
-    # More than there is room for: the whole pack's, over as many fields as it fills, as the standard says.
-    left = max(0, round(1000 * pack))
-    fields = [min(_NO_CELL - 1, max(0, left - i * (_NO_CELL - 1))) for i in range(_CELLS)]
-    return [fields[0], *(field or _NO_CELL for field in fields[1:])], [0] * _FURTHER_CELLS
+        return [NOT_KNOWN_UINT16] * CELLS, [0] * FURTHER_CELLS
+    if cells > CELLS + FURTHER_CELLS:
+        return pack_voltages(pack), [0] * FURTHER_CELLS
+    each = [whole(pack * MILLIVOLTS_PER_VOLT / cells, 16, signed=False)] * cells
+    first, further = each[:CELLS], each[CELLS:]
+    return (
+        first + [NOT_KNOWN_UINT16] * (CELLS - len(first)),
+        further + [0] * (FURTHER_CELLS - len(further)),
+    )
 
 
 def _battery_status(machine: Machine, view: VehicleView) -> Any:
@@ -237,12 +234,12 @@ def _battery_status(machine: Machine, view: VehicleView) -> Any:
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
         mavlink.MAV_BATTERY_TYPE_LIPO,
-        0x7FFF,
+        NOT_KNOWN_INT16,
         voltages,
-        whole(100 * view.battery_current, 16, unknown=-1),
+        whole(view.battery_current * CENTIAMPERES_PER_AMPERE, 16, unknown=-1),
         -1,
         -1,
-        whole(100 * view.battery_remaining, 8, unknown=-1),
+        whole(view.battery_remaining * PERCENT, 8, unknown=-1),
         0,
         _charge_state(machine, view),
         further,

@@ -28,6 +28,7 @@ from sitl_bridge.frames import (
     rotate_inverse,
 )
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
+from sitl_bridge.mavlink.fields import whole
 from sitl_bridge.mavlink.framing import Bytes, Packer, write_frame
 from sitl_bridge.mavlink.hil import (
     FRAME_BODY_FRD,
@@ -294,17 +295,12 @@ class TickWriter:
         record["lat"] = round(point.latitude * DEG_E7_PER_DEG)
         record["lon"] = round(point.longitude * DEG_E7_PER_DEG)
         record["alt"] = round(point.altitude * MILLIMETRES_PER_METRE)
-        record["eph"] = _unsigned(fix.horizontal_accuracy * CENTIMETRES_PER_METRE)
-        record["epv"] = _unsigned(fix.vertical_accuracy * CENTIMETRES_PER_METRE)
-        record["vel"] = _unsigned(ground_speed * CENTIMETRES_PER_METRE)
+        record["eph"] = whole(fix.horizontal_accuracy * CENTIMETRES_PER_METRE, 16, signed=False)
+        record["epv"] = whole(fix.vertical_accuracy * CENTIMETRES_PER_METRE, 16, signed=False)
+        record["vel"] = whole(ground_speed * CENTIMETRES_PER_METRE, 16, signed=False)
         for name, value in (("vn", north), ("ve", east), ("vd", down)):
-            record[name] = max(-32768, min(32767, round(value * CENTIMETRES_PER_METRE)))
+            record[name] = whole(value * CENTIMETRES_PER_METRE, 16)
         course = math.atan2(east, north) % (2 * math.pi)
-        record["cog"] = _unsigned(course * CENTIDEGREES_PER_RADIAN) % 36000
+        record["cog"] = whole(course * CENTIDEGREES_PER_RADIAN, 16, signed=False) % 36000
         record["fix_type"] = fix.fix_type
         record["satellites_visible"] = fix.satellites
-
-
-def _unsigned(value: float) -> int:
-    """Rounded into an unsigned 16-bit field."""
-    return max(0, min(65535, round(value)))

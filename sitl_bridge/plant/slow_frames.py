@@ -12,14 +12,18 @@ from typing import Any
 from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import (
+    CENTIAMPERES_PER_AMPERE,
     CENTIMETRES_PER_METRE,
     DEG_E7_PER_DEG,
     MICROSECONDS_PER_SECOND,
+    MILLIAMPERE_HOURS_PER_AMPERE_HOUR,
     MILLIMETRES_PER_METRE,
+    PERCENT,
     LocalOrigin,
     enu_to_ned,
     flu_to_frd,
 )
+from sitl_bridge.mavlink.fields import NOT_KNOWN_INT16, NOT_KNOWN_UINT16, pack_voltages, whole
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
 from sitl_bridge.plant.battery import BatteryReading
@@ -30,16 +34,6 @@ from sitl_bridge.vehicle import Battery
 HEARTBEAT_INTERVAL = 1.0
 POSITION_INTERVAL = 0.2
 BATTERY_INTERVAL = 0.5
-MILLIVOLTS_PER_VOLT = 1e3
-CENTIAMPERES_PER_AMPERE = 1e2
-MILLIAMPERE_HOURS_PER_AMPERE_HOUR = 1e3
-NOT_KNOWN_UINT16 = 0xFFFF
-NOT_KNOWN_INT16 = 0x7FFF
-
-
-def within(value: float, low: int, high: int) -> int:
-    """Rounded into an integer field."""
-    return max(low, min(high, round(value)))
 
 
 def load_heartbeat() -> Any:
@@ -65,7 +59,7 @@ class LoadOnMap:
         east, north, up = x[LOAD_POSITION].tolist()
         point = self._origin.geodetic((east, north, up))
         v_east, v_north, v_up = (CENTIMETRES_PER_METRE * v for v in x[LOAD_VELOCITY].tolist())
-        vx, vy, vz = (within(v, -0x8000, 0x7FFF) for v in enu_to_ned((v_east, v_north, v_up)))
+        vx, vy, vz = (whole(v, 16) for v in enu_to_ned((v_east, v_north, v_up)))
         return common.MAVLink_global_position_int_message(
             time_boot_ms=(time_usec // 1000) & 0xFFFFFFFF,
             lat=round(point.latitude * DEG_E7_PER_DEG),
@@ -80,19 +74,18 @@ class LoadOnMap:
 
 
 def battery_status(battery: Battery, now: BatteryReading) -> Any:
-    """BATTERY_STATUS; the pack's voltage stands in the first cell, for its cells are not measured."""
+    """BATTERY_STATUS; the pack's voltage as a whole, for its cells are not measured."""
     used = (1.0 - now.remaining) * battery.capacity
-    rest = [NOT_KNOWN_UINT16] * 9
     return common.MAVLink_battery_status_message(
         id=0,
         battery_function=common.MAV_BATTERY_FUNCTION_ALL,
         type=common.MAV_BATTERY_TYPE_LIPO,
         temperature=NOT_KNOWN_INT16,
-        voltages=[within(now.voltage * MILLIVOLTS_PER_VOLT, 0, NOT_KNOWN_UINT16 - 1), *rest],
-        current_battery=within(now.current * CENTIAMPERES_PER_AMPERE, 0, 0x7FFF),
+        voltages=pack_voltages(now.voltage),
+        current_battery=whole(now.current * CENTIAMPERES_PER_AMPERE, 16),
         current_consumed=round(used * MILLIAMPERE_HOURS_PER_AMPERE_HOUR),
         energy_consumed=-1,
-        battery_remaining=round(100.0 * now.remaining),
+        battery_remaining=round(now.remaining * PERCENT),
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.streams import STREAMABLE
-from controller.ground.telemetry import CAPABILITIES, cell_voltages, whole
+from controller.ground.telemetry import CAPABILITIES, cell_voltages
 from controller.ground.view import Gps, profile_of
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.frames import Geodetic, quaternion_from_euler
@@ -197,16 +197,6 @@ def test_the_target_is_reported() -> None:
     assert target.z == pytest.approx(-2.6, abs=0.1)  # the vehicle's, not the load's
     assert target.type_mask & 0b111 == 0
     assert target.type_mask & 0b111111000 == 0b111111000
-
-
-def test_whole_numbers() -> None:
-    assert whole(1.6, 8) == 2
-    assert whole(300.0, 8) == 127
-    assert whole(-300.0, 8) == -128
-    assert whole(-1.0, 8, signed=False) == 0
-    assert whole(math.nan, 8, unknown=-1) == -1
-    assert whole(math.inf, 16, signed=False) == 0xFFFF
-    assert whole(math.nan, 16) == 0
 
 
 def test_a_grounded_view_is_what_the_other_tests_think() -> None:
