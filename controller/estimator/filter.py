@@ -27,7 +27,7 @@ from controller.estimator.layout import (
     X_ATTITUDE,
     Array,
 )
-from controller.estimator.tuning import CONSUMER, Tuning, parameters
+from controller.estimator.tuning import Tuning, parameters
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
 
 Sequence3 = tuple[float, float, float] | Array
@@ -88,7 +88,7 @@ class Estimator:
     then read `state`, then report with `command` what the rotors are told from this tick on.
     """
 
-    def __init__(self, vehicle: Vehicle, period: float, tuning: Tuning = CONSUMER) -> None:
+    def __init__(self, vehicle: Vehicle, period: float, tuning: Tuning) -> None:
         """period: s between ticks. Starts in alignment at rest."""
         self.vehicle = vehicle
         self.tuning = tuning

@@ -97,10 +97,6 @@ class Tuning:
     """s, over which the start-up alignment averages"""
 
 
-CONSUMER = Tuning()
-RTK = replace(CONSUMER, gps_position_std=(0.02, 0.02, 0.03), gps_velocity_std=(0.05, 0.05, 0.05))
-
-
 class Instrument(Protocol):
     """A sensor of HIL_SENSOR, as the vehicle description has it (noise as density, SI)."""
 

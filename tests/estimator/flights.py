@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.estimator.filter import Estimator
 from controller.estimator.layout import ACCELEROMETER, GPS_POSITION, PARTS
-from controller.estimator.tuning import CONSUMER, Tuning
+from controller.estimator.tuning import Tuning
 from controller.lqr import Weights, sampled_gain, sampled_model
 from controller.model import linear_model, with_integrator
 from sitl_bridge.frames import euler_from_quaternion
@@ -23,6 +23,8 @@ from sitl_bridge.plant.world import World
 from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
+CONSUMER = Tuning()
+RTK = replace(CONSUMER, gps_position_std=(0.02, 0.02, 0.03), gps_velocity_std=(0.05, 0.05, 0.05))
 RATE_HZ = 250.0
 PERIOD = 1.0 / RATE_HZ
 HELD_TICKS = 250

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from controller.estimator.bound import load_relative_bound
-from controller.estimator.tuning import CONSUMER, RTK
 from controller.estimator.weights import estimated_weights
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.vehicle import Vehicle
-from tests.estimator.flights import PERIOD, Flight, Sensors, fly
+from tests.estimator.flights import CONSUMER, PERIOD, RTK, Flight, Sensors, fly
 
 TUNINGS = {"consumer": CONSUMER, "rtk": RTK}
 
@@ -35,7 +34,7 @@ def flight(rest_length: float, sensors: str, on_truth: bool, seed: int) -> Fligh
 
 @pytest.mark.parametrize(("rest_length", "limit"), [(1.0, (2.0, 2.0, 1.0)), (10.0, (7.0, 7.0, 1.0))])
 def test_load_relative_to_vehicle(rest_length: float, limit: tuple[float, float, float]) -> None:
-    """Issue 6's limits (cm), and near the bound: half of it more for one short flight, and not below it."""
+    """Within the limits (cm), and at the bound: neither far above it, nor below what chance allows."""
     errors = np.array([flight(rest_length, "consumer", True, seed).load_relative_error() for seed in (1, 2)])
     rms = np.sqrt(np.mean(errors**2, axis=0))
     bound = load_relative_bound(paper(rest_length), PERIOD, CONSUMER)

@@ -7,11 +7,10 @@ import pytest
 
 from controller.estimator.filter import Estimator
 from controller.estimator.layout import LOAD_ON_CABLE, LOAD_RELEASED, SENSORS
-from controller.estimator.tuning import CONSUMER
 from controller.estimator.weights import estimated_weights
 from sitl_bridge.frames import rotate_inverse
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
-from tests.estimator.flights import PERIOD, RATE_HZ, Flight, Sample, fly
+from tests.estimator.flights import CONSUMER, PERIOD, RATE_HZ, Flight, Sample, fly
 from tests.estimator.test_accuracy import paper
 
 GRAVITY_FREE = dataclasses.replace(CONSUMER, has_ground=False)

@@ -9,17 +9,16 @@ from scipy.spatial.transform import Rotation
 
 from controller.estimator.filter import Estimator, eq31_jacobian
 from controller.estimator.layout import ERROR_SIZE, LOAD_ON_CABLE, PARTS, SENSORS, X_LOAD, Array
-from controller.estimator.tuning import CONSUMER
 from controller.estimator.update import CORRECTION, SMALLEST_SWING, inject
 from sitl_bridge.vehicle import hover_rotor_speed
-from tests.estimator.flights import PERIOD
+from tests.estimator.flights import CONSUMER, PERIOD
 from tests.estimator.test_accuracy import paper
 
 
 def hovering(ticks: int, rest_length: float = 1.0) -> Estimator:
     """A filter that hovers with sensors that read what it expects, but for the magnetometer's noise."""
     vehicle = paper(rest_length)
-    estimator = Estimator(vehicle, PERIOD)
+    estimator = Estimator(vehicle, PERIOD, CONSUMER)
     for k in range(200 + ticks):
         load(estimator, k)
         if k == 200:
@@ -63,7 +62,7 @@ def test_covariance_over_a_million_updates() -> None:
 @given(hnp.arrays(float, 3, elements=st.floats(-0.5, 0.5)), st.integers(0, 2**32 - 1))
 def test_a_correction_turns_the_hanging_load(correction: Array, seed: int) -> None:
     """What lies along the cable stretches it, the rest turns it, and the covariance turns with it."""
-    estimator = Estimator(paper(1.0), PERIOD)
+    estimator = Estimator(paper(1.0), PERIOD, CONSUMER)
     estimator.memory["load_mode"] = LOAD_ON_CABLE
     f = estimator.arrays[0].view(np.recarray)[0]
     part = PARTS["load"]
