@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
+from controller.design_names import DESIGNS, ON_ESTIMATE
 from controller.estimator.weights import estimated_weights
 from controller.flatness import body
 from controller.law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
@@ -25,10 +26,6 @@ from controller.state import (
     WRENCH_SIZE,
 )
 from sitl_bridge.vehicle import Vehicle
-
-DESIGNS = ("default", "paper", "paper-lqr")
-ON_ESTIMATE = "default-on-estimate"
-"""What `default` is for feedback from the estimator."""
 
 ANTI_WINDUP_TIME = 1.0
 """Time constant, s, with which the integral gives way while the rotors are at a limit."""

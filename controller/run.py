@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from controller.autopilot import Autopilot
 from controller.awake import AwakeClock
-from controller.designs import ON_ESTIMATE
+from controller.design_names import ON_ESTIMATE
 from controller.feedback import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, new_session
 from sitl_bridge.mavlink.links import Address, Link, open_link

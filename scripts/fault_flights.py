@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from controller.autopilot import Autopilot  # noqa: E402
-from controller.designs import ON_ESTIMATE  # noqa: E402
+from controller.design_names import ON_ESTIMATE  # noqa: E402
 from controller.estimate_feedback import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
 from controller.reference import setpoint  # noqa: E402

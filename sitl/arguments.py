@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from controller.design_names import DESIGNS
 from controller.ground.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from sitl.argument_types import host_and_port, link_address, number, ports, whole
 from sitl_bridge.description import preset_names, vehicle_names
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 
 DEFAULT_RATE_HZ = 250.0
-DESIGNS = ("default", "paper", "paper-lqr")
 
 
 def build_parser() -> argparse.ArgumentParser:

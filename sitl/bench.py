@@ -17,6 +17,7 @@ import numpy as np
 from controller.autopilot import Autopilot
 from controller.hil.answers import AnswerWriter
 from controller.reference import setpoint
+from sitl.arguments import DEFAULT_RATE_HZ
 from sitl.fly import FlightError, Pair, watch
 from sitl.free_ports import free_ports
 from sitl.ground_bench import ground_figures
@@ -28,7 +29,6 @@ from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle import Vehicle
 
-RATE_HZ = 250.0
 STEPS = 20_000
 TRIPS = 7_500
 FLIGHT_S = 30.0
@@ -45,7 +45,7 @@ WARMING_TICKS = 250
 
 def physics_step_us(vehicle: Vehicle) -> float:
     """Time of one RK4 step, us, in runs of a thousand."""
-    world = Simulation(vehicle, RATE_HZ, seed=0).world
+    world = Simulation(vehicle, DEFAULT_RATE_HZ, seed=0).world
     world.advance(1000)
     began = time.perf_counter()
     for _ in range(STEPS // 1000):
@@ -56,7 +56,7 @@ def physics_step_us(vehicle: Vehicle) -> float:
 def control_step_us(vehicle: Vehicle) -> float:
     """Time of one control step, us: estimate in, rotor commands out."""
     autopilot = Autopilot(
-        vehicle, "default", RATE_HZ, lambda start: setpoint((3.0, 5.0, 2.0), start), np.zeros(16)
+        vehicle, "default", DEFAULT_RATE_HZ, lambda start: setpoint((3.0, 5.0, 2.0), start), np.zeros(16)
     )
     estimate = np.zeros(18)
     estimate[2] = vehicle.hover_length
@@ -69,7 +69,7 @@ def control_step_us(vehicle: Vehicle) -> float:
 
 def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     """Bytes of a tick with truth, and of its answer."""
-    simulation = Simulation(vehicle, RATE_HZ, seed=0)
+    simulation = Simulation(vehicle, DEFAULT_RATE_HZ, seed=0)
     simulation.ask_for_truth(True)
     simulation.heard()
     simulation.next_tick()
@@ -84,18 +84,18 @@ def estimator_update_us(vehicle: Vehicle) -> float:
     from controller.estimator.filter import Estimator
     from sitl_bridge.vehicle import hover_rotor_speeds
 
-    tuning = tuning_for(vehicle, RATE_HZ)
-    estimator = Estimator(vehicle, 1.0 / RATE_HZ, tuning)
+    tuning = tuning_for(vehicle, DEFAULT_RATE_HZ)
+    estimator = Estimator(vehicle, 1.0 / DEFAULT_RATE_HZ, tuning)
     speeds = np.array(hover_rotor_speeds(vehicle))
     still, up = (0.0, 0.0, 0.0), (0.0, 0.0, vehicle.gravity)
     times = []
     for tick in range(STEPS // 2):
-        now = tick / RATE_HZ
+        now = tick / DEFAULT_RATE_HZ
         east, north, height = tuning.field
         estimator.imu(up, still)
         estimator.magnetometer((east + 1e-9 * (tick % 3), north, height))
         estimator.barometer(0.0)
-        if tick % round(RATE_HZ * tuning.gps_period) == 0:
+        if tick % round(DEFAULT_RATE_HZ * tuning.gps_period) == 0:
             estimator.gps(now, still, still)
         began = time.perf_counter()
         estimator.tick(now)
@@ -110,7 +110,7 @@ def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ON_TRUT
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     [port] = free_ports(1)
     sensors = ["--set", "sensors.preset=consumer"] if feedback == ON_ESTIMATE else []
-    common = ["--scenario", scenario, "--rate", str(RATE_HZ), *sensors, *more]
+    common = ["--scenario", scenario, "--rate", str(DEFAULT_RATE_HZ), *sensors, *more]
     plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
     controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
@@ -150,7 +150,7 @@ def bench(repeats: int) -> dict[str, float]:
             "physics_step_us": physics_step_us(vehicle),
             "control_step_us": control_step_us(vehicle),
             "estimator_update_us": estimator_update_us(consumer),
-            "lockstep_tick_us": 1e6 / (factor * RATE_HZ),
+            "lockstep_tick_us": 1e6 / (factor * DEFAULT_RATE_HZ),
             "round_trip_us": round_trip_us(*sizes, TRIPS),
             "real_time_factor": factor,
             "launch_to_first_command_s": launch_to_first_command_s(),
@@ -158,19 +158,19 @@ def bench(repeats: int) -> dict[str, float]:
         full_factor = lockstep_flight("hover", *full_options)["real_time_factor"]
         measured["physics_step_us_full"] = physics_step_us(full)
         measured["physics_step_us_ground_full"] = physics_step_us(standing)
-        measured["lockstep_tick_us_full"] = 1e6 / (full_factor * RATE_HZ)
+        measured["lockstep_tick_us_full"] = 1e6 / (full_factor * DEFAULT_RATE_HZ)
         measured["physics_step_full_ratio"] = measured["physics_step_us_full"] / measured["physics_step_us"]
         measured["lockstep_tick_full_ratio"] = (
             measured["lockstep_tick_us_full"] / measured["lockstep_tick_us"]
         )
         estimated = lockstep_flight("setpoint", feedback=ON_ESTIMATE)["real_time_factor"]
-        measured["lockstep_tick_us_estimate"] = 1e6 / (estimated * RATE_HZ)
+        measured["lockstep_tick_us_estimate"] = 1e6 / (estimated * DEFAULT_RATE_HZ)
         measured["real_time_factor_estimate"] = estimated
         measured["launch_to_first_command_s_estimate"] = launch_to_first_command_s(ON_ESTIMATE)
         measured["lockstep_tick_estimate_ratio"] = (
             measured["lockstep_tick_us_estimate"] / measured["lockstep_tick_us"]
         )
-        measured |= ground_figures(RATE_HZ)
+        measured |= ground_figures(DEFAULT_RATE_HZ)
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():
             samples.setdefault(key, []).append(value)

@@ -14,6 +14,7 @@ from sitl.flight import FlightOptions
 from sitl.fly import FlightError, Pair, watch
 from sitl.free_ports import free_ports
 from sitl.metrics import reference_positions
+from sitl.paper.offline import RATE_HZ
 from sitl.report import positions, read_state_log
 from sitl.scenario import GroundControl, load_scenario, scenario_vehicle
 from sitl_bridge.mavlink.links import Address
@@ -22,8 +23,6 @@ from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
-
-RATE_HZ = 250.0
 
 
 class Flight(NamedTuple):

@@ -16,6 +16,7 @@ from controller.law import WORK, Design, engaged_memory
 from controller.reference import Path
 from controller.state import STATE_SIZE
 from controller.step import control_step
+from sitl.arguments import DEFAULT_RATE_HZ
 from sitl_bridge.frames import euler_from_quaternion
 from sitl_bridge.plant import state as plant
 from sitl_bridge.plant.world import World
@@ -23,7 +24,8 @@ from sitl_bridge.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-RATE_HZ = 250.0
+RATE_HZ = DEFAULT_RATE_HZ
+"""Every flight of the page, over the link or not: at what `sitl fly` flies at."""
 LOST = 1e3
 """A load that is so far away, m, has been lost: the simulation ends."""
 

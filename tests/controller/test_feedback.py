@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.autopilot import Autopilot
-from controller.designs import ON_ESTIMATE
+from controller.design_names import ON_ESTIMATE
 from controller.estimate_feedback import ALIGNMENT_TIME, EstimateFeedback
 from controller.hil.session import HilSession, new_session
 from controller.hil.ticks import TickReader

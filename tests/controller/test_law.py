@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from controller.designs import DESIGNS, design
+from controller.design_names import DESIGNS
+from controller.designs import design
 from controller.law import WORK, Design, engaged_memory, remember, step
 from controller.reference import Path, circle, setpoint
 from controller.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array

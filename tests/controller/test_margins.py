@@ -7,7 +7,8 @@ import pytest
 from scipy import linalg
 
 from controller.analysis import closed_loop_matrix, delay_margin, spectral_radius
-from controller.designs import DESIGNS, design
+from controller.design_names import DESIGNS
+from controller.designs import design
 from controller.law import WORK, Design, engaged_memory, remember, step
 from controller.model import LinearModel, actuated_model
 from controller.reference import setpoint
