@@ -85,6 +85,25 @@ def rotate_inverse(q: Quaternion, v: Triple) -> Triple:
     return rotate((q[0], -q[1], -q[2], -q[3]), v)
 
 
+Matrix = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@kernel
+def rotation_matrix(qw: Any, qx: Any, qy: Any, qz: Any) -> Matrix:
+    """Body to world, row by row, of a unit quaternion."""
+    return (
+        1 - 2 * (qy * qy + qz * qz),
+        2 * (qx * qy - qw * qz),
+        2 * (qx * qz + qw * qy),
+        2 * (qx * qy + qw * qz),
+        1 - 2 * (qx * qx + qz * qz),
+        2 * (qy * qz - qw * qx),
+        2 * (qx * qz - qw * qy),
+        2 * (qy * qz + qw * qx),
+        1 - 2 * (qx * qx + qy * qy),
+    )
+
+
 @kernel
 def euler_from_quaternion(q: Quaternion) -> Triple:
     """Roll, pitch, yaw in rad, for R = Rz(yaw)·Ry(pitch)·Rx(roll)."""

@@ -60,6 +60,11 @@ def test_vectors_against_matrices_and_back(v: Triple) -> None:
     assert frames.flu_to_frd(frames.flu_to_frd(v)) == v
 
 
+@given(quaternions())
+def test_the_matrix_of_an_attitude(q: Quaternion) -> None:
+    np.testing.assert_allclose(np.reshape(frames.rotation_matrix(*q), (3, 3)), matrix(q), atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("yaw_enu", "yaw_ned"), [(0.0, 90.0), (90.0, 0.0), (180.0, -90.0), (-90.0, 180.0), (45.0, 45.0)]
 )

@@ -6,25 +6,13 @@ import math
 
 from controller.estimator.layout import X_ATTITUDE, Array
 from sitl_bridge.compiled import kernel
-
-Rows = tuple[float, float, float, float, float, float, float, float, float]
+from sitl_bridge.frames import Matrix, rotation_matrix
 
 
 @kernel
-def matrix(x: Array) -> Rows:
+def matrix(x: Array) -> Matrix:
     """The rotation matrix body to world, by rows, of the nominal state's attitude."""
-    w, i, j, k = x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3]
-    return (
-        1.0 - 2.0 * (j * j + k * k),
-        2.0 * (i * j - w * k),
-        2.0 * (i * k + w * j),
-        2.0 * (i * j + w * k),
-        1.0 - 2.0 * (i * i + k * k),
-        2.0 * (j * k - w * i),
-        2.0 * (i * k - w * j),
-        2.0 * (j * k + w * i),
-        1.0 - 2.0 * (i * i + j * j),
-    )
+    return rotation_matrix(x[X_ATTITUDE], x[X_ATTITUDE + 1], x[X_ATTITUDE + 2], x[X_ATTITUDE + 3])
 
 
 @kernel

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from sitl_bridge.compiled import kernel, vector_kernel
+from sitl_bridge.frames import rotation_matrix
 from sitl_bridge.plant.state import ANCHOR_EAST, ANCHOR_NORTH, LEG_LANES, LOAD_CONTACT, Array
 from sitl_bridge.vehicle import Ground
 
@@ -29,22 +30,6 @@ def contact(ground: Ground, gravity: float, mass: float, points: int) -> tuple[f
     frequency = math.sqrt(gravity / ground.sink)
     chi = 2.0 * ground.damping_ratio * frequency / gravity
     return stiffness, chi, 2.0 * ground.damping_ratio * stiffness / frequency
-
-
-@kernel
-def rotation_matrix(qw: Any, qx: Any, qy: Any, qz: Any) -> tuple[Any, Any, Any, Any, Any, Any, Any, Any, Any]:
-    """Body to world, row by row, of a unit quaternion."""
-    return (
-        1 - 2 * (qy * qy + qz * qz),
-        2 * (qx * qy - qw * qz),
-        2 * (qx * qz + qw * qy),
-        2 * (qx * qy + qw * qz),
-        1 - 2 * (qx * qx + qz * qz),
-        2 * (qy * qz - qw * qx),
-        2 * (qx * qz - qw * qy),
-        2 * (qy * qz + qw * qx),
-        1 - 2 * (qx * qx + qy * qy),
-    )
 
 
 @kernel
