@@ -15,26 +15,25 @@ class FaultyPath:
     def __init__(self, faults: Sequence[LinkFault], direction: str, seed: int) -> None:
         """direction: `to_autopilot` or `to_plant`."""
         self._faults = [fault for fault in faults if fault.direction in ("both", direction)]
-        # A stream each: what one fault draws changes no other.
+        # A stream each, named by its number among its kind: what one fault draws changes no other.
+        kinds = [fault.failure for fault in self._faults]
         self._draws = [
-            stream(seed, f"link.{direction}.{index}.{fault.failure}")
-            for index, fault in enumerate(self._faults)
+            stream(seed, f"link.{direction}.{kind}.{kinds[:index].count(kind)}")
+            for index, kind in enumerate(kinds)
         ]
         self._queue: list[tuple[float, int, bytes]] = []
         self._count = 0
-        self.dropped = 0
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram that was sent now."""
-        arrival, echo = now, None
+        arrival, echo, lost = now, None, False
         for fault, draw in zip(self._faults, self._draws, strict=True):
             end = float("inf") if fault.duration is None else fault.at + fault.duration
             if not fault.at <= now < end or draw.random() >= fault.share:
                 continue
             match fault.failure:
                 case "drop":
-                    self.dropped += 1
-                    return
+                    lost = True  # the others draw nevertheless, so that they go on as they would without it
                 case "delay" | "reorder":  # with a share below 1, later datagrams overtake this one
                     arrival += fault.delay
                 case "jitter":
@@ -43,6 +42,8 @@ class FaultyPath:
                     echo = fault.delay
                 case "stall":
                     arrival = max(arrival, end)
+        if lost:
+            return
         self._put(arrival, datagram)
         if echo is not None:
             self._put(arrival + echo, datagram)
