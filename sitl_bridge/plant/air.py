@@ -14,7 +14,7 @@ from sitl_bridge.plant.turbulence import Turbulent, dryden
 from sitl_bridge.vehicle import Air, Gust, Vehicle
 
 WIND_HOLD = 0.01
-"""s; each row of the wind table holds so long."""
+"""s; each row of the wind table holds so long, to the nearest integration step."""
 
 
 @kernel
@@ -38,20 +38,21 @@ def gust_velocity(gust: Gust, time: Array) -> Array:
 
 
 class Wind:
-    """Air velocity at vehicle and load, in rows of `WIND_HOLD` seconds.
+    """Air velocity at vehicle and load, in rows of `hold` seconds.
 
     Each body has its own turbulence; theirs are correlated as Dryden's field is over the cable's length,
     exp(-l / L_w), so that a short cable feels one gust and a long one two.
     """
 
-    def __init__(self, vehicle: Vehicle, seed: int) -> None:
+    def __init__(self, vehicle: Vehicle, seed: int, hold: float = WIND_HOLD) -> None:
+        self.hold = hold
         self.air: Air = vehicle.air
         self.gusts = list(vehicle.air.gusts)
         self._row = 0
         self._points: list[Turbulent] = []
         if self.air.turbulence is not None:
             self._points = [
-                Turbulent(self.air.turbulence, WIND_HOLD, stream(seed, f"turbulence.{body}"))
+                Turbulent(self.air.turbulence, hold, stream(seed, f"turbulence.{body}"))
                 for body in ("vehicle", "load")
             ]
             self._shared = math.exp(-vehicle.hover_length / dryden(self.air.turbulence).length[2])
@@ -76,7 +77,7 @@ class Wind:
             rows[:, :3] += at_vehicle
             rows[:, 3:] += self._shared * at_vehicle + math.sqrt(1.0 - self._shared**2) * own
         # A row holds the mean of its interval, to second order: the value in its middle.
-        time = WIND_HOLD * (self._row + 0.5 + np.arange(count, dtype=np.float64))
+        time = self.hold * (self._row + 0.5 + np.arange(count, dtype=np.float64))
         for gust in self.gusts:
             velocity = gust_velocity(gust, time)
             if gust.acts_on != "load":

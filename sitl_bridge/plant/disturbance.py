@@ -20,6 +20,8 @@ class HeldTable(ABC):
 
     def __init__(self, hold_time: float, step: float) -> None:
         self.hold_steps = max(1, round(hold_time / step))
+        self.hold = self.hold_steps * step
+        """What a row really holds, s: a whole number of steps."""
         self.table: NDArray[np.float64] = np.zeros((TABLE_ROWS, 6))
         self.now: NDArray[np.float64] = np.zeros(6)
         """The row that acts now."""
@@ -87,7 +89,7 @@ class HeldWind(HeldTable):
 
     def reset(self, seed: int) -> None:
         """Begin again with a fresh stream."""
-        self.wind = Wind(self._vehicle, seed)
+        self.wind = Wind(self._vehicle, seed, self.hold)
         self.constant = self.wind.constant
         self.begin()
 

@@ -8,6 +8,8 @@ from scipy.signal import welch
 
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.plant.air import WIND_HOLD, Wind, gust_velocity
+from sitl_bridge.plant.disturbance import HeldWind
+from sitl_bridge.plant.parameters import step_count
 from sitl_bridge.plant.streams import stream
 from sitl_bridge.plant.turbulence import Turbulent, dryden
 from sitl_bridge.vehicle import Gust, Turbulence, Vehicle
@@ -121,3 +123,21 @@ def test_gust_is_one_minus_cosine() -> None:
     time = np.array([0.5, 1.0, 1.5, 2.0, 3.0, 4.0])
     expected = np.outer([0.0, 0.0, 0.5, 1.0, 0.0, 0.0], gust.peak)
     np.testing.assert_allclose(gust_velocity(gust, time), expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("rate_hz", "stiffness"), [(250.0, 1e2), (330.0, 1e2), (70.0, 1e2), (250.0, 1e5)])
+def test_a_gust_blows_at_its_time_whatever_the_step(rate_hz: float, stiffness: float) -> None:
+    """Also where no whole number of steps is 10 ms: at any time within a row of what it should be then."""
+    gust = Gust(start=5.0, duration=2.0, peak=(8.0, 0.0, 0.0))
+    vehicle = load_vehicle("iris", [f"cable.stiffness={stiffness}"])
+    vehicle = vehicle.model_copy(update={"air": vehicle.air.model_copy(update={"gusts": (gust,)})})
+    step = 1.0 / (rate_hz * step_count(vehicle, 1.0 / rate_hz))
+    held = HeldWind(vehicle, step, 1)
+    times, blown = [], []
+    for index in range(round(8.0 / step)):
+        times.append(index * step)
+        blown.append(held.now[0])
+        held.advance(1)
+    steepest = math.pi * gust.peak[0] / gust.duration
+    expected = gust_velocity(gust, np.array(times))[:, 0]
+    assert np.abs(np.array(blown) - expected).max() < 1.01 * steepest * 0.5 * held.hold
