@@ -35,6 +35,8 @@ FLIGHT_S = 30.0
 FULL = (
     "initial.start=hover",
     "sensors.preset=urban",
+    "sensors.tracker.rate=20",
+    "disturbance.force_std=0.5",
     "air.wind=[3.0, 1.0, 0.0]",
     "air.turbulence.wind_at_6_m=7.7",
 )
@@ -72,6 +74,8 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
     simulation = Simulation(vehicle, DEFAULT_RATE_HZ, seed=0)
     simulation.ask_for_truth(True)
     simulation.heard()
+    simulation.next_tick()
+    simulation.datagram()  # the sensors' first: on it all is due that is said now and then
     simulation.next_tick()
     writer = AnswerWriter(0, Packer(1, COMPONENT_AUTOPILOT))
     writer.controls[:4] = 0.7

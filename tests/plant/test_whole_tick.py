@@ -86,6 +86,9 @@ FLIGHTS = {
             "sensors.preset=urban",
             "air.wind=[3, 1, 0]",
             "air.turbulence.wind_at_6_m=7.7",
+            "sensors.tracker.rate=20",
+            "sensors.tracker.delay=0.05",
+            "sensors.tracker.angle_noise=0.01",
         ],
         Faults(
             sensor=(SensorFault(at=2.0, duration=1.0, sensor="gps", failure="wrong"),),

@@ -79,6 +79,11 @@ class LoadTracker:
         self._white = stream(seed, "tracker.white")
         self._garbage = stream(seed, "tracker.garbage")
 
+    def ticks_left(self, tick: int) -> int:
+        """How many ticks after `tick` pass without anything to do for the camera."""
+        ticks = self.every - 1 - tick % self.every
+        return min(ticks, self._under_way[0][0] - tick - 1) if self._under_way else ticks
+
     def sample(self, tick: int, x: Array) -> Sighting | None:
         """The sighting that arrives at `tick` (counted from 0 or 1, each once)."""
         if tick % self.every == 0:
