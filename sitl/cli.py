@@ -98,7 +98,7 @@ def _plant(arguments: argparse.Namespace) -> int:
     outcome = run(options, speaker, stop)
     if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
-    return 0
+    return EXIT_FAILED if outcome["failure"] else 0
 
 
 def _controller(arguments: argparse.Namespace) -> int:

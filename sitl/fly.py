@@ -153,5 +153,7 @@ def _events(stream: IO[bytes], buffer: bytes, outcome: Outcome, pair: Pair, show
         elif kind == "progress":
             show(event)
         elif kind == "end":
+            if failure := event.pop("failure"):
+                outcome.failure = f"the plant gave up: {failure}"
             outcome.end = event
     return rest

@@ -13,6 +13,7 @@ takes them in order. Nothing here has state. Gusts join the wind, link faults go
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Literal, NamedTuple, Protocol
 
 from sitl_bridge.description import DescriptionError
@@ -50,7 +51,7 @@ class CableFault(Section):
 
 
 class LoadFault(Timed):
-    mass: float = quantity("kg", "of the load from then on", gt=0, le=1e4)
+    mass: float = quantity("kg", "of the load from then on", ge=1e-3, le=1e4)
 
 
 class LinkFault(Timed):
@@ -140,17 +141,26 @@ class Due(NamedTuple):
 
 
 def timeline(faults: Faults) -> list[Due]:
-    """What happens to the world when, in order; the end of a fault is an action too."""
-    found: list[Due] = []
-    for sensor in faults.sensor:
-        doing = FAILURES[sensor.failure]
-        found += _from_to(sensor, SetSensor(sensor.sensor, doing), SetSensor(sensor.sensor, WORKS))
-    for rotor in faults.rotor:
-        found += _from_to(rotor, SetRotor(rotor.rotor - 1, rotor.thrust), SetRotor(rotor.rotor - 1, 1.0))
-    found += [Due(cable.at, ReleaseCable()) for cable in faults.cable]
-    for load in faults.load:
-        found += _from_to(load, SetLoadMass(load.mass), SetLoadMass(None))
+    """What happens to the world when, in order; the end of a fault is an action too.
+
+    Of faults of one thing that overlap, the last to begin counts, and when it ends, what it has covered.
+    """
+    found = [Due(cable.at, ReleaseCable()) for cable in faults.cable]
+    for name in sorted({fault.sensor for fault in faults.sensor}):
+        of_sensor = [fault for fault in faults.sensor if fault.sensor == name]
+        doing = [SetSensor(name, FAILURES[fault.failure]) for fault in of_sensor]
+        found += _course(of_sensor, doing, SetSensor(name, WORKS))
+    for number in sorted({fault.rotor for fault in faults.rotor}):
+        of_rotor = [fault for fault in faults.rotor if fault.rotor == number]
+        thrust = [SetRotor(number - 1, fault.thrust) for fault in of_rotor]
+        found += _course(of_rotor, thrust, SetRotor(number - 1, 1.0))
+    found += _course(faults.load, [SetLoadMass(fault.mass) for fault in faults.load], SetLoadMass(None))
     return sorted(found, key=lambda due: due.time)
+
+
+def lightest_load(faults: Faults) -> float | None:
+    """The smallest mass, kg, that a fault gives the load; None: none does."""
+    return min((fault.mass for fault in faults.load), default=None)
 
 
 def checked(faults: Faults, vehicle: Vehicle) -> Faults:
@@ -184,10 +194,20 @@ def with_gusts(vehicle: Vehicle, faults: Faults) -> Vehicle:
     return vehicle.model_copy(update={"air": air})
 
 
-def _from_to(fault: Timed, begin: Action, end: Action) -> list[Due]:
-    found = [Due(fault.at, begin)]
-    if fault.duration is not None:
-        found.append(Due(fault.at + fault.duration, end))
+def _course(faults: Sequence[Timed], actions: Sequence[Action], well: Action) -> list[Due]:
+    """What the faults of one thing do to it, in order of time: each what the action at its place says."""
+    spans = [
+        (fault.at, math.inf if fault.duration is None else fault.at + fault.duration) for fault in faults
+    ]
+    found: list[Due] = []
+    now = well
+    for time in sorted({time for span in spans for time in span if time < math.inf}):
+        active = [index for index, (begin, end) in enumerate(spans) if begin <= time < end]
+        latest = max(active, key=lambda index: (spans[index][0], index), default=None)
+        action = well if latest is None else actions[latest]
+        if action != now:
+            found.append(Due(time, action))
+            now = action
     return found
 
 

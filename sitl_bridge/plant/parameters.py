@@ -110,22 +110,25 @@ def _fill_ground(p: np.void, vehicle: Vehicle) -> None:
     p["load_radius"] = vehicle.load.radius
 
 
-def fastest_rate(vehicle: Vehicle) -> float:
+def fastest_rate(vehicle: Vehicle, lightest_load: float | None = None) -> float:
     """Largest modulus (1/s) of the eigenvalues of cable and ground contact, each on its own.
+
+    lightest_load: kg, where the load is not always as it is described; the ground under it is.
 
     A mode of stiffness frequency w and damping rate 2 s has s -+ sqrt(s² - w²). The cable between two free
     bodies has w² = k_a / m, s = c_a / 2m, with m the reduced mass. The ground has, for the vehicle's
     turning about body axis i on its legs, w² = sum k (r² - r_i²) / I_i, for heave of either body w² = g /
     sink, and damping in proportion to stiffness.
     """
-    reduced = 1.0 / (1.0 / vehicle.airframe.mass + 1.0 / vehicle.load.mass)
+    load_mass = min(vehicle.load.mass, lightest_load or math.inf)
+    reduced = 1.0 / (1.0 / vehicle.airframe.mass + 1.0 / load_mass)
     modes = [(vehicle.cable.stiffness / reduced, vehicle.cable.damping / reduced)]
     if vehicle.ground is not None:
         stiffness, _, damping = contact(
             vehicle.ground, vehicle.gravity, vehicle.airframe.mass, len(vehicle.airframe.legs)
         )
         heave = vehicle.gravity / vehicle.ground.sink
-        squares = [heave]
+        squares = [heave * vehicle.load.mass / load_mass]
         for axis, inertia in enumerate(vehicle.airframe.inertia):
             arms = sum(
                 sum(part * part for index, part in enumerate(leg) if index != axis)
@@ -149,10 +152,12 @@ STEP_TIMES_RATE = 0.25
 stability."""
 
 
-def step_count(vehicle: Vehicle, duration: float) -> int:
+def step_count(vehicle: Vehicle, duration: float, lightest_load: float | None = None) -> int:
     """Number of equal steps that `duration` seconds (a tick, a hold) are integrated in.
+
+    lightest_load: kg, as for `fastest_rate`.
 
     Rule: no step longer than 1 ms, nor than a quarter of the inverse of the vehicle's `fastest_rate`.
     """
-    longest = min(LONGEST_STEP, STEP_TIMES_RATE / fastest_rate(vehicle))
+    longest = min(LONGEST_STEP, STEP_TIMES_RATE / fastest_rate(vehicle, lightest_load))
     return max(1, math.ceil(duration / longest * (1.0 - 1e-9)))

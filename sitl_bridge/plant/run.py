@@ -18,7 +18,7 @@ from sitl_bridge.plant.load_to import LoadTo
 from sitl_bridge.plant.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.notices import Notices
 from sitl_bridge.plant.realtime import Realtime
-from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
+from sitl_bridge.plant.simulation import NO_FAULTS, Diverged, Simulation
 from sitl_bridge.plant.state import LOAD_POSITION
 from sitl_bridge.plant.statelog import FILE_NAME, StateLog
 from sitl_bridge.process import Speaker, StopRequest
@@ -121,10 +121,14 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         f"waiting for an autopilot on {options.hil} (system {options.instance + 1})"
     )
     station: Station | None = None
+    failure = None
     try:
         if options.load_to is not None:
             station = Station(options.load_to, LoadTo(options.instance, simulation.origin))
         _loop(clock, link, tlog, progress, station, stop)
+    except Diverged as error:
+        failure = str(error)
+        speaker.say(f"{failure}: it ends here; what the description asks for cannot be simulated")
     finally:
         link.close()
         if station is not None:
@@ -135,7 +139,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
             log.close()
     if stop:
         speaker.say(f"stopped by {stop.reason} at t = {simulation.scenario_time:.2f} s")
-    outcome = _outcome(options, clock, progress, stop)
+    outcome = {**_outcome(options, clock, progress, stop), "failure": failure}
     speaker.event("end", **outcome)
     return outcome
 

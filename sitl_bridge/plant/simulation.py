@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, decode
 from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
 from sitl_bridge.plant.answers import AnswerReader
-from sitl_bridge.plant.faults import Faults, from_command, timeline, with_gusts
+from sitl_bridge.plant.faults import Action, Faults, from_command, lightest_load, timeline, with_gusts
 from sitl_bridge.plant.messages import TRUTH, TickWriter
 from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH
 from sitl_bridge.plant.slow_frames import LoadOnMap, SlowFrames
@@ -46,6 +46,10 @@ class Recorder(Protocol):
         """The next row is filled in."""
 
 
+class Diverged(ArithmeticError):
+    """The state is not finite any more: what was described cannot be simulated."""
+
+
 NO_FAULTS = Faults()
 _FAULT_GRAIN = 1e-9  # s; a fault at a tick's time happens at that tick, rounding or not
 BATTERY_STEP = 0.04
@@ -68,9 +72,10 @@ class Simulation:
     ) -> None:
         self.rate_hz = rate_hz
         self.period = 1.0 / rate_hz
-        self.world = World(with_gusts(vehicle, faults), rate_hz, seed)
+        self.world = World(with_gusts(vehicle, faults), rate_hz, seed, lightest_load(faults))
         self._faults = timeline(faults)
         self._faults_done = 0
+        self._injected: dict[tuple[Any, ...], Action] = {}
         self.tick = 0
         """Number of the current tick."""
         self.time_usec = 0
@@ -126,8 +131,14 @@ class Simulation:
         return self.ticks_flown / self.rate_hz
 
     def datagram(self) -> bytes:
-        """The current tick's frames; the same bytes as often as it is asked for."""
+        """The current tick's frames; the same bytes as often as it is asked for.
+
+        Raises Diverged. Ticks that `exchange` flies are not looked at, but GPS has it give way many times a
+        second.
+        """
         if self._datagram is None:
+            if not np.isfinite(self.world.state).all():
+                raise Diverged(f"the state is not finite any more at t = {self.scenario_time:.3f} s")
             fresh = self._sensors_due and self.tick >= self._first_sensed
             if fresh:
                 self._begin_sensing()
@@ -158,6 +169,14 @@ class Simulation:
     def _begin_sensing(self) -> None:
         self.world.reset_sensors()
         self._sensors_due = False
+        self._inject(self._injected.values())
+
+    def _inject(self, actions: Iterable[Action]) -> None:
+        """Let something fail by command: also over the resets until the scenario begins."""
+        for action in list(actions):
+            action.apply(self.world)
+            if not self.started:
+                self._injected[type(action), action[:1]] = action
 
     def ask_for_truth(self, wanted: bool) -> None:
         """Send ODOMETRY of vehicle and load with every tick, or no more."""
@@ -175,9 +194,10 @@ class Simulation:
         self._ticks_left = 0
         self._under_way.clear()
         for _ in range(self._delay_ticks):
-            self._under_way.append(np.array(self.world.trim_controls))
+            self._under_way.append(np.array(self.world.initial_controls))
         self._faults_done = 0
         self._power = self.world.battery(0.0)
+        self._inject(self._injected.values())
         self._apply_faults()
         self._on_begin()
 
@@ -290,8 +310,7 @@ class Simulation:
         result = common.MAV_RESULT_ACCEPTED
         if command.command == common.MAV_CMD_INJECT_FAILURE:
             actions = from_command(command.param1, command.param2, command.param3, len(self._vehicle.rotors))
-            for action in actions or ():
-                action.apply(self.world)
+            self._inject(actions or ())
             result = common.MAV_RESULT_UNSUPPORTED if actions is None else result
         elif command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL and command.param1 == ODOMETRY.message_id:
             self.ask_for_truth(command.param2 >= 0)

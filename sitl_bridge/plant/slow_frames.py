@@ -62,10 +62,10 @@ class LoadOnMap:
         vx, vy, vz = (whole(v, 16) for v in enu_to_ned((v_east, v_north, v_up)))
         return common.MAVLink_global_position_int_message(
             time_boot_ms=(time_usec // 1000) & 0xFFFFFFFF,
-            lat=round(point.latitude * DEG_E7_PER_DEG),
-            lon=round(point.longitude * DEG_E7_PER_DEG),
-            alt=round(point.altitude * MILLIMETRES_PER_METRE),
-            relative_alt=round(up * MILLIMETRES_PER_METRE),
+            lat=whole(point.latitude * DEG_E7_PER_DEG, 32),
+            lon=whole(point.longitude * DEG_E7_PER_DEG, 32),
+            alt=whole(point.altitude * MILLIMETRES_PER_METRE, 32),
+            relative_alt=whole(up * MILLIMETRES_PER_METRE, 32),
             vx=vx,
             vy=vy,
             vz=vz,

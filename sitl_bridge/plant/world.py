@@ -52,15 +52,20 @@ SCHEDULE = np.dtype(
 class World:
     """State and what acts on it. `state` is the vector of `plant.state`, world ENU, SI units."""
 
-    def __init__(self, vehicle: Vehicle, rate_hz: float, seed: int) -> None:
+    def __init__(
+        self, vehicle: Vehicle, rate_hz: float, seed: int, lightest_load: float | None = None
+    ) -> None:
+        """lightest_load: kg, to which `set_load_mass` may go; absent: what is described."""
         self.vehicle = vehicle
-        self.steps_per_tick = step_count(vehicle, 1.0 / rate_hz)
+        self.steps_per_tick = step_count(vehicle, 1.0 / rate_hz, lightest_load)
         self.step = 1.0 / (rate_hz * self.steps_per_tick)
         self.state = initial_state(vehicle)
         self.inner = initial_inner_state(vehicle)
         self.reactions = np.zeros(REACTIONS_SIZE)
         self.rotor_speed = np.zeros(MOST_ROTORS)
         self.trim_controls = trim_controls(vehicle)
+        self.initial_controls = self.trim_controls if vehicle.initial.start == "hover" else STOPPED
+        """What the rotors do until the first command."""
         self._seed = seed
         self._record = parameters(vehicle)
         self._truth = np.zeros(1, dtype=MEASUREMENT)
@@ -126,7 +131,7 @@ class World:
         self._charge = battery.charge if battery is not None else 1.0
         self._speed_share[:] = 1.0
         self.set_load_mass(None)
-        self.command(self.trim_controls if self.vehicle.initial.start == "hover" else STOPPED)
+        self.command(self.initial_controls)
 
     def reset_sensors(self) -> None:
         """Every sensor works, with fresh random streams; the next tick that is measured is 0 or 1."""
@@ -161,10 +166,12 @@ class World:
     def ticks_left(self, sensor_tick: int) -> int:
         """How many ticks, the last measured one being `sensor_tick`, need no more than `tick.exchange`."""
         ticks = min(self.instruments.ticks_left(sensor_tick), self.gps.ticks_left(sensor_tick))
+        if self.tracker is not None:
+            ticks = min(ticks, self.tracker.ticks_left(sensor_tick))
         for held in (self._force, self._wind):
             if not held.constant:
                 ticks = min(ticks, (held.steps_left - 1) // self.steps_per_tick)
-        return 0 if self.tracker is not None else ticks
+        return ticks
 
     def next_steps(self) -> tuple[int, int]:
         """Number of the next step in the tables of held forces and winds."""

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common
 from sitl_bridge.description import DescriptionError, load_vehicle, validated
 from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.plant.faults import (
+    FAILURES,
     Due,
     Faults,
     LinkFault,
@@ -25,7 +26,7 @@ from sitl_bridge.plant.faults import (
 from sitl_bridge.plant.link_faults import FaultyPath
 from sitl_bridge.plant.sensors.gps import NO_FIX
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
-from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.simulation import Diverged, Simulation
 from sitl_bridge.plant.state import CABLE_HOLDS
 from sitl_bridge.plant.world import World
 
@@ -67,6 +68,52 @@ def test_timeline_in_order() -> None:
 def test_faulty_tables_are_refused(table: dict[str, object], fault: str) -> None:
     with pytest.raises(DescriptionError, match=fault):
         validated(Faults, table, "test")
+
+
+spans = st.tuples(
+    st.integers(0, 20), st.none() | st.integers(1, 20), st.sampled_from(["off", "stuck", "wrong"])
+)
+
+
+@given(st.lists(spans, max_size=6))
+def test_faults_of_one_sensor_overlap_as_they_were_meant(found: list[tuple[int, int | None, str]]) -> None:
+    """Whenever one looks, the sensor does what the last fault to begin says of those that are not over."""
+    table = [
+        {"sensor": "gps", "failure": failure, "at": at / 10}
+        | ({} if lasts is None else {"duration": lasts / 10})
+        for at, lasts, failure in found
+    ]
+    actions = timeline(validated(Faults, {"sensor": table}, "test"))
+    assert [due.time for due in actions] == sorted(due.time for due in actions)
+    for instant in range(45):
+        now = instant / 10 + 0.05
+        doing = WORKS
+        for due in actions:
+            if due.time <= now:
+                assert isinstance(due.action, SetSensor)
+                doing = due.action.doing
+        on = [
+            fault
+            for fault in found
+            if fault[0] <= instant and (fault[1] is None or instant < fault[0] + fault[1])
+        ]
+        last = max(on, key=lambda fault: fault[0], default=None)
+        candidates = {FAILURES[f[2]] for f in on if last is not None and f[0] == last[0]} or {WORKS}
+        assert doing in candidates
+
+
+def test_a_fault_may_begin_where_another_ends() -> None:
+    """0.1 + 0.2 is more than 0.3 to a computer; the second fault acts nevertheless, and lasts."""
+    table = [
+        {"sensor": "gps", "failure": "off", "at": 0.1, "duration": 0.2},
+        {"sensor": "gps", "failure": "wrong", "at": 0.3, "duration": 0.5},
+    ]
+    for order in (table, table[::-1]):
+        assert timeline(validated(Faults, {"sensor": order}, "test")) == [
+            Due(0.1, SetSensor("gps", OFF)),
+            Due(0.3, SetSensor("gps", WRONG)),
+            Due(0.8, SetSensor("gps", WORKS)),
+        ]
 
 
 def test_command_numbers_are_mavlinks() -> None:
@@ -179,6 +226,19 @@ def test_link_faults() -> None:
     assert sent([{"failure": "stall", "at": 1.0}])[-1][1] == 249
 
 
+def test_a_fault_of_the_link_changes_no_other() -> None:
+    """With losses, what arrives has the delays that it would have had without."""
+    jitter: dict[str, object] = {"failure": "jitter", "at": 0.0}
+    drop: dict[str, object] = {"failure": "drop", "share": 0.3, "at": 0.0}
+    alone = {index: arrival for arrival, index in sent([jitter])}
+    for both in ([jitter, drop], [drop, jitter]):
+        found = sent(both)
+        assert 600 < len(found) < 800
+        assert all(alone[index] == arrival for arrival, index in found)
+    lost_alone = {index for _, index in sent([drop])}
+    assert {index for _, index in sent([jitter, drop])} == lost_alone
+
+
 def test_scenario_faults_happen_at_their_time() -> None:
     """On the tick that they are due, whichever clock steps the world."""
     table = {"cable": [{"at": 0.1}], "gust": [{"start": 0.0, "duration": 1.0, "peak": [5.0, 0.0, 0.0]}]}
@@ -214,6 +274,88 @@ def test_failures_are_injected_over_mavlink(unit: int, result: int, stopped: int
     assert decode(answer).result == result
     simulation.step(simulation.world.trim_controls)
     assert np.count_nonzero(simulation.world.rotor_speed[:4] == 0.0) == stopped
+
+
+def inject(simulation: Simulation, unit: int, kind: int, instance: int) -> None:
+    command = common.MAVLink_command_long_message(
+        1, 191, common.MAV_CMD_INJECT_FAILURE, 0, unit, kind, instance, 0, 0, 0, 0
+    )
+    [frame] = split(Packer(1, 1).pack(command)).frames
+    reply = simulation.handle(frame)
+    assert reply is not None
+    assert decode(split(reply).frames[0]).result == common.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.parametrize("answered_before", [False, True])
+def test_what_was_injected_before_take_off_is_still_broken_in_flight(answered_before: bool) -> None:
+    """Neither the sensors' new beginning nor that of the scenario heals anything."""
+    simulation = Simulation(load_vehicle("iris", ["initial.start=hover"]), 250.0, 1)
+    simulation.datagram()
+    if answered_before:
+        simulation.heard()
+    inject(simulation, common.FAILURE_UNIT_SYSTEM_MOTOR, common.FAILURE_TYPE_OFF, 2)
+    inject(simulation, common.FAILURE_UNIT_SYSTEM_MOTOR, common.FAILURE_TYPE_OFF, 3)
+    inject(simulation, common.FAILURE_UNIT_SYSTEM_MOTOR, common.FAILURE_TYPE_OK, 3)
+    inject(simulation, common.FAILURE_UNIT_SENSOR_BARO, common.FAILURE_TYPE_OFF, 0)
+    simulation.heard()
+    simulation.next_tick()
+    simulation.datagram()
+    simulation.begin()
+    simulation.step(simulation.world.trim_controls)
+    simulation.datagram()
+    assert (simulation.world.rotor_speed[:4] == 0.0).tolist() == [False, True, False, False]
+    assert simulation.world.measurement["updated"][0] & (1 << 9) == 0  # the barometer's pressure
+
+
+@pytest.mark.parametrize("start", ["hover", "ground"])
+def test_a_load_as_light_as_can_be_is_simulated(start: str) -> None:
+    """The step follows the lightest load: it leaps with no more energy than cable or ground had stored."""
+    mass = 1e-3
+    faults = validated(Faults, {"load": [{"mass": mass, "at": 0.0}]}, "test")
+    vehicle = load_vehicle("heavy", [f"initial.start={start}"])
+    simulation = Simulation(vehicle, 250.0, 1, faults=faults)
+    simulation.begin()
+    assert vehicle.ground is not None
+    weight = vehicle.load.mass * vehicle.gravity
+    stiffness = vehicle.cable.stiffness if start == "hover" else weight / vehicle.ground.sink
+    fastest = math.sqrt(weight**2 / stiffness / mass)
+    speeds = []
+    for _ in range(25):
+        simulation.step(simulation.world.initial_controls)
+        simulation.datagram()
+        speeds.append(float(np.linalg.norm(simulation.world.state[16:19])))
+    assert 0.0 < max(speeds) < fastest
+
+
+def test_a_state_that_is_not_finite_ends_the_simulation() -> None:
+    simulation = Simulation(load_vehicle("iris", ["initial.start=hover"]), 250.0, 1)
+    simulation.begin()
+    simulation.world.state[4] = math.nan
+    simulation.step(simulation.world.trim_controls)
+    with pytest.raises(Diverged, match=r"not finite any more at t = 0\.004 s"):
+        simulation.datagram()
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, -3e6), (3e7, -3e7, 3e6), (1e300, 0.0, 0.0)])
+def test_however_far_it_falls_the_plant_goes_on(place: tuple[float, float, float]) -> None:
+    """Fields of positions end at some thousand kilometres; they keep to that."""
+    simulation = Simulation(load_vehicle("paper"), 250.0, 1)
+    simulation.begin()
+    simulation.world.state[:3] += place
+    simulation.world.state[13:16] += place
+    for _ in range(60):
+        simulation.datagram()
+        simulation.step(simulation.world.trim_controls)
+
+
+def test_a_delay_before_the_first_command_leaves_a_vehicle_standing() -> None:
+    simulation = Simulation(load_vehicle("iris", ["loop.delay_ticks=3"]), 250.0, 1)
+    simulation.begin()
+    for _ in range(3):
+        simulation.step(np.array(simulation.world.trim_controls))
+        assert not simulation.world.rotor_speed.any()
+    simulation.step(np.array(simulation.world.trim_controls))
+    assert simulation.world.rotor_speed[:4].all()
 
 
 def test_a_fault_that_the_vehicle_cannot_have_is_refused() -> None:
