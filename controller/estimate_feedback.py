@@ -59,6 +59,8 @@ def tuning_for(vehicle: Vehicle, rate_hz: float) -> Tuning:
         field_at(vehicle.home),
         has_ground=vehicle.ground is not None,
         rotor_time_constant=rotor_time_constant(vehicle),
+        estimate_load_wind=vehicle.estimation.load_wind,
+        estimate_load_mass=vehicle.estimation.load_mass,
     )
 
 

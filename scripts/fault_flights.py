@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any, get_args
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -25,7 +26,7 @@ from controller.estimate_feedback import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
 from controller.reference import setpoint  # noqa: E402
 from sitl_bridge.description import load_vehicle, validated  # noqa: E402
-from sitl_bridge.plant.faults import Faults  # noqa: E402
+from sitl_bridge.plant.faults import Faults, SensorFault  # noqa: E402
 from sitl_bridge.plant.link_faults import FaultyPath  # noqa: E402
 from sitl_bridge.plant.notices import Notices  # noqa: E402
 from sitl_bridge.plant.realtime import Realtime  # noqa: E402
@@ -36,18 +37,25 @@ AT, END = 5.0, 20.0
 TICK_OF_CLOCK = 1e-7  # s, so that rounding never leaves a datagram just ahead
 START = ["initial.start=hover", "initial.load_position=[0.0, 0.0, 20.0]", "air.turbulence.wind_at_6_m=15.4"]
 
+TRACKER = ["sensors.tracker.rate=20", "sensors.tracker.delay=0.05", "sensors.tracker.angle_noise=0.01"]
+"""What a vehicle has besides where the tracker fails."""
+
+
+def sensor_flights() -> dict[str, dict[str, Any]]:
+    """A flight for each way in which each sensor can fail."""
+    flights = {
+        f"{sensor} {failure}": {"sensor": [{"sensor": sensor, "failure": failure, "at": AT}]}
+        for sensor in get_args(SensorFault.model_fields["sensor"].annotation)
+        for failure in get_args(SensorFault.model_fields["failure"].annotation)
+        if failure != "lost" or sensor == "gps"
+    }
+    lost = {"sensor": "gps", "failure": "lost", "at": AT, "duration": 5.0}
+    return {**flights, "gps lost for 5 s": {"sensor": [lost]}}
+
+
 FLIGHTS = {
     "none": {},
-    "accelerometer stuck": {"sensor": [{"sensor": "accelerometer", "failure": "stuck", "at": AT}]},
-    "accelerometer wrong": {"sensor": [{"sensor": "accelerometer", "failure": "wrong", "at": AT}]},
-    "gyroscope stuck": {"sensor": [{"sensor": "gyroscope", "failure": "stuck", "at": AT}]},
-    "magnetometer off": {"sensor": [{"sensor": "magnetometer", "failure": "off", "at": AT}]},
-    "magnetometer wrong": {"sensor": [{"sensor": "magnetometer", "failure": "wrong", "at": AT}]},
-    "barometer off": {"sensor": [{"sensor": "barometer", "failure": "off", "at": AT}]},
-    "barometer wrong": {"sensor": [{"sensor": "barometer", "failure": "wrong", "at": AT}]},
-    "GPS lost": {"sensor": [{"sensor": "gps", "failure": "lost", "at": AT}]},
-    "GPS lost for 5 s": {"sensor": [{"sensor": "gps", "failure": "lost", "at": AT, "duration": 5.0}]},
-    "GPS wrong": {"sensor": [{"sensor": "gps", "failure": "wrong", "at": AT}]},
+    **sensor_flights(),
     "rotor 1 at 90 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.9, "at": AT}]},
     "rotor 1 at 70 % thrust": {"rotor": [{"rotor": 1, "thrust": 0.7, "at": AT}]},
     "rotor 1 off for 0.1 s": {"rotor": [{"rotor": 1, "thrust": 0.0, "at": AT, "duration": 0.1}]},
@@ -66,7 +74,7 @@ FLIGHTS = {
     "link: stall of 1 s": {"link": [{"failure": "stall", "at": AT, "duration": 1.0}]},
 }
 DRAWN = {
-    "sensors": ("none", "accelerometer wrong", "gyroscope stuck", "barometer wrong", "GPS lost", "GPS wrong"),
+    "sensors": ("none", "accelerometer wrong", "gyroscope stuck", "barometer wrong", "gps lost", "gps wrong"),
     "the rest": (
         "rotor 1 at 70 % thrust",
         "rotor 1 off for 0.1 s",
@@ -81,7 +89,8 @@ DRAWN = {
 def fly(table: dict[str, list[dict[str, object]]]) -> NDArray[np.float64]:
     """One flight with these faults: rows of time and state (n, 20), a tick each, to its end or the ground."""
     faults = validated(Faults, table, "table")
-    vehicle = load_vehicle("iris", START)
+    tracked = any(fault.sensor == "tracker" for fault in faults.sensor)
+    vehicle = load_vehicle("iris", [*START, *TRACKER] if tracked else START)
     simulation = Simulation(vehicle, RATE, seed=0, duration_s=END, faults=faults)
     clock = Realtime(simulation, Notices(lambda text: None), 0)
     session = new_session(

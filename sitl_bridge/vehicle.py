@@ -164,6 +164,15 @@ class Loop(Section):
     delay_ticks: int = quantity("ticks", "the plant applies each command so many ticks later", 0, ge=0, le=64)
 
 
+class Estimation(Section):
+    """What an estimator is to find out besides its usual state; see docs/estimator.md."""
+
+    load_wind: bool = quantity("-", "a slowly varying force on the load, N", False)
+    load_mass: bool = quantity(
+        "-", "the load's mass, of which the description's is then a first guess", False
+    )
+
+
 class Home(Section):
     """Where the world's origin lies; Zurich by default, as PX4's own simulator has it."""
 
@@ -191,6 +200,7 @@ class Vehicle(Section):
     battery: Battery | None = None
     sensors: Sensors = Sensors()
     loop: Loop = Loop()
+    estimation: Estimation = Estimation()
     home: Home = Home()
 
     @model_validator(mode="after")

@@ -150,10 +150,16 @@ def gps(f: Filter, given: Any) -> None:
     """
     m = f.m
     slot = recall(f, CLONE_MOTION, given.gps_time)
+    repeats = _repeats_itself(f, given)
     m.next_clone = given.gps_time
     while m.next_clone < m.time + 0.5 * f.p.period:
         m.next_clone += f.p.clone_interval
     if slot < 0:
+        return
+    if repeats:
+        m.rejected[GPS_POSITION] += 1
+        m.rejected[GPS_VELOCITY] += 1
+        forget(f, CLONE_MOTION, given.gps_time)
         return
     m.align_gps = True
     m.adrift = False
@@ -186,6 +192,25 @@ def gps(f: Filter, given: Any) -> None:
         inject(f)
         book(f, sensor, squares, 3)
     forget(f, CLONE_MOTION, given.gps_time)
+
+
+STALE_FIXES = 3
+"""So many fixes that are the same to the last digit, in flight, and the receiver is stuck."""
+LIVELY_VELOCITY = 0.02
+"""m/s: a receiver with less noise may say the same twice, in centimetres and centimetres per second."""
+
+
+@kernel
+def _repeats_itself(f: Filter, given: Any) -> bool:
+    """Compare a fix with the one before; whether the receiver is stuck."""
+    m, same = f.m, True
+    for axis in range(3):
+        same = same and given.gps_position[axis] == m.last_fix[axis]
+        same = same and given.gps_velocity[axis] == m.last_fix[3 + axis]
+        m.last_fix[axis], m.last_fix[3 + axis] = given.gps_position[axis], given.gps_velocity[axis]
+    m.repeated_fixes = m.repeated_fixes + 1 if same else 0
+    lively = f.p.gps_velocity_std[0] > LIVELY_VELOCITY
+    return bool(lively and m.vehicle_mode == FLYING and m.repeated_fixes >= STALE_FIXES)
 
 
 SUSPICION_BLEND = 0.03

@@ -165,6 +165,10 @@ MEMORY = np.dtype(
         ("load_resets", "i8"),
         ("stale_count", "i8", STALE_SENSORS),
         ("last_sample", "f8", (STALE_SENSORS, 3)),
+        ("last_change", "f8", (STALE_SENSORS, 3)),
+        ("roughness", "f8", STALE_SENSORS),
+        ("last_fix", "f8", 6),
+        ("repeated_fixes", "i8"),
         ("clone_width", "i8"),
         ("clone_time", "f8", CLONES),
         ("clone_kind", "i8", CLONES),
@@ -192,6 +196,8 @@ MEMORY = np.dtype(
 grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
 something below has carried the vehicle or the load; hung: m, world, where the load hung last with all its
 weight, and how well that was known relative to the vehicle.
+last_change: of a sample from the one before; roughness: running mean of the change of that, in standard
+deviations of a live sensor's; last_fix: position and velocity of GPS, m and m/s.
 innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
 within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """

@@ -49,10 +49,11 @@ from controller.estimator.sensors import (
     on_ground,
     rest,
 )
-from controller.estimator.transitions import leave_ground, release, stand, watch
+from controller.estimator.transitions import leave_ground, lose_track, release, stand, watch
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 MOST_MISSED_TICKS = 50
+"""Ticks without a measurement that the model bridges; of longer silence it knows no more than its length."""
 BLIND_CLONE_TICKS = 5
 """As long as no fix has said when fixes are taken: near enough to any of them."""
 SLIP_SPEED = 0.3
@@ -118,6 +119,8 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
             remember(f, CLONE_LOAD)
             m.next_load_clone += p.tracker_interval
     m.time = given.time
+    if ticks > MOST_MISSED_TICKS:
+        lose_track(f, (ticks - MOST_MISSED_TICKS) * p.period)
     silence = m.time - max(m.last_used[GPS_POSITION], m.last_used[GPS_VELOCITY])
     m.adrift = m.vehicle_mode == FLYING and silence > OUTAGE
     if given.has_imu:

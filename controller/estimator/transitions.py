@@ -14,6 +14,8 @@ from controller.estimator.layout import (
     ERROR_SIZE,
     FLYING,
     FORCE,
+    GPS_POSITION,
+    GPS_VELOCITY,
     LOAD,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
@@ -29,7 +31,7 @@ from controller.estimator.layout import (
     X_VELOCITY,
     Filter,
 )
-from controller.estimator.sensors import measured_pull, saturated, stuck
+from controller.estimator.sensors import failed, measured_pull, saturated
 from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
@@ -72,7 +74,7 @@ def watch(f: Filter, measured: Any) -> None:
     p, m, x = f.p, f.m, f.x
     if m.vehicle_mode == STANDING and m.grounded and m.thrust > p.vehicle_mass * p.gravity:
         leave_ground(f)
-    if m.vehicle_mode != FLYING or stuck(f, ACCELEROMETER):
+    if m.vehicle_mode != FLYING or failed(f, ACCELEROMETER):
         return
     for axis in range(3):
         if saturated(f, measured[axis]):
@@ -278,6 +280,36 @@ def doubt(f: Filter) -> None:
         if m.load_mode == LOAD_ON_CABLE:
             cov[LOAD + axis, LOAD + axis] += (DOUBT * p.rest_length) ** 2
             cov[LOAD_VELOCITY + axis, LOAD_VELOCITY + axis] += DOUBTED_SPEED**2
+
+
+LOST_ACCELERATION = 1.0
+"""Of gravity: what a vehicle that nothing was heard of may have had, its rotors stopped by then."""
+LOST_RATE = 0.3
+"""rad/s, at which it may have turned meanwhile"""
+
+
+@kernel
+def lose_track(f: Filter, gap: float) -> None:
+    """Nothing was heard for `gap` seconds: vehicle and load may be anywhere that a fall could take them."""
+    m, p, cov = f.m, f.p, f.P
+    if m.vehicle_mode != FLYING:
+        return
+    for sensor in (GPS_POSITION, GPS_VELOCITY):
+        # No outage of GPS, whose correction would reach the law by and by: of a fall it has to know at once.
+        m.last_used[sensor] = min(m.time, m.last_used[sensor] + gap)
+    speed = LOST_ACCELERATION * p.gravity * gap
+    way = 0.5 * speed * gap
+    apart = min(way, 0.5 * p.rest_length)
+    for axis in range(3):
+        place, velocity = POSITION + axis, VELOCITY + axis
+        cov[place, place] += way * way
+        cov[velocity, velocity] += speed * speed
+        cov[place, velocity] += way * speed
+        cov[velocity, place] += way * speed
+        cov[ATTITUDE + axis, ATTITUDE + axis] += (LOST_RATE * gap) ** 2
+        if m.load_mode == LOAD_ON_CABLE:
+            cov[LOAD + axis, LOAD + axis] += apart * apart
+            cov[LOAD_VELOCITY + axis, LOAD_VELOCITY + axis] += (apart / gap) ** 2
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from controller.estimator.bound import load_relative_bound
+from controller.estimator.layout import PARTS, X_LOAD_WIND
 from controller.estimator.weights import estimated_weights
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.vehicle import Vehicle
@@ -108,3 +109,22 @@ def test_an_unknown_load_mass_is_found() -> None:
     flown = fly(vehicle, estimated_weights(vehicle), 20.0, 1, tuning=tuning, believed=believed)
     mass = believed.load.mass * np.exp(flown.estimator.nominal[32])
     assert mass == pytest.approx(12.0, rel=0.02)
+
+
+def test_an_unknown_wind_on_the_load_is_found() -> None:
+    """A steady side force of 5 N on the load alone, with accelerometers whose bias is known to be small."""
+    vehicle, believed = paper(1.0, "load.drag.linear=1.0", "air.wind=[5.0, 0.0, 0.0]"), paper(1.0)
+    tuning = dataclasses.replace(CONSUMER, estimate_load_wind=True, accel_bias_std=1e-3, accel_bias_walk=1e-6)
+    flown = fly(
+        vehicle,
+        estimated_weights(vehicle),
+        40.0,
+        1,
+        sensors=Sensors(accel_bias=0.0),
+        tuning=tuning,
+        believed=believed,
+    )
+    cov = flown.estimator.error_covariance[PARTS["load_wind"], PARTS["load_wind"]]
+    off = flown.estimator.nominal[X_LOAD_WIND : X_LOAD_WIND + 3] - np.array([5.0, 0.0, 0.0])
+    assert np.all(np.abs(off) < 3.0 * np.sqrt(np.diag(cov)))
+    assert np.all(np.sqrt(np.diag(cov))[:2] < 1.0)

@@ -10,7 +10,7 @@ from controller.estimator.layout import LOAD_ON_CABLE, LOAD_RELEASED, SENSORS
 from controller.estimator.weights import estimated_weights
 from sitl_bridge.frames import rotate_inverse
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
-from tests.estimator.flights import CONSUMER, PERIOD, RATE_HZ, Flight, Sample, fly
+from tests.estimator.flights import CONSUMER, HELD_TICKS, PERIOD, RATE_HZ, Flight, Sample, fly
 from tests.estimator.test_accuracy import paper
 
 GRAVITY_FREE = dataclasses.replace(CONSUMER, has_ground=False)
@@ -67,6 +67,42 @@ def test_gps_jump_is_refused() -> None:
     assert flight.estimator.memory["rejected"][SENSORS.index("gps_position")] == 50
     assert np.abs(flight.estimate[:, 0:3] - flight.truth[:, 0:3]).max() < 1.0
     assert np.abs(flight.truth[:, 3:6]).max() < 0.5
+
+
+def test_a_gps_that_repeats_itself_is_no_gps() -> None:
+    """The same fix to the last digit, time after time: as if there were none, and back when it lives."""
+    last: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def stuck(sample: Sample) -> None:
+        if 5.0 <= sample.time < 15.0 and sample.gps:
+            last[:] = last or [sample.gps[1:]]
+            sample.gps = (sample.gps[0], *last[0])
+
+    flight = on_estimate(stuck, duration=30.0)
+    assert flight.estimator.memory["rejected"][SENSORS.index("gps_position")] > 90
+    row = round(14.9 * RATE_HZ)
+    assert np.all(np.abs(error(flight, 14.9)[0:3]) < 3.0 * flight.std[row // 10][0:3])
+    assert np.abs(error(flight, 29.9)[0:3]).max() < 1.0
+
+
+@pytest.mark.parametrize("gap", [0.5, 1.0, 2.0])
+def test_after_a_gap_a_fall_is_believed(gap: float) -> None:
+    """Nothing was heard for so long, and the vehicle fell meanwhile: GPS says so, and is not refused."""
+    flight = on_estimate(lambda sample: None, duration=5.0)
+    estimator, truth = flight.estimator, flight.truth[-1]
+    now = (HELD_TICKS + 5.0 * RATE_HZ - 1) * PERIOD + gap
+    estimator.tick(now)
+    estimator.tick(now + PERIOD)
+    fallen = truth[0:3] - np.array([0.0, 0.0, 0.5 * 9.81 * gap**2])
+    rejected = estimator.memory["rejected"].copy()
+    for tick in range(2, 60):
+        if tick % 25 == 0:
+            estimator.gps(
+                now + tick * PERIOD, fallen, np.array([0.0, 0.0, -9.81 * gap]), *2 * [(0.5, 0.5, 0.8)]
+            )
+        estimator.tick(now + tick * PERIOD)
+    assert np.all(estimator.memory["rejected"] == rejected)
+    assert estimator.state()[8] < -5.0 * gap
 
 
 def test_magnetometer_stuck() -> None:

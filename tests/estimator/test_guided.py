@@ -147,13 +147,25 @@ FAULT_AT = 30.0
     [
         ({"sensor": [{"sensor": "accelerometer", "failure": "stuck", "at": FAULT_AT}]}, "Accelerometer lost"),
         ({"sensor": [{"sensor": "gyroscope", "failure": "stuck", "at": FAULT_AT}]}, "Gyroscope lost"),
+        (
+            {"sensor": [{"sensor": "accelerometer", "failure": "garbage", "at": FAULT_AT}]},
+            "Accelerometer lost",
+        ),
+        ({"sensor": [{"sensor": "gyroscope", "failure": "garbage", "at": FAULT_AT}]}, "Gyroscope lost"),
         ({"rotor": [{"rotor": 1, "thrust": 0.7, "at": FAULT_AT}]}, ""),
         ({"rotor": [{"rotor": 1, "thrust": 0.0, "at": FAULT_AT, "duration": 0.1}]}, ""),
     ],
-    ids=["accelerometer", "gyroscope", "weak rotor", "rotor off for a moment"],
+    ids=[
+        "stuck accelerometer",
+        "stuck gyroscope",
+        "garbage of the accelerometer",
+        "garbage of the gyroscope",
+        "weak rotor",
+        "rotor off for a moment",
+    ],
 )
 def test_hold_outlives_what_the_model_can_bridge(faults: dict[str, Any], said: str) -> None:
-    """A stuck inertial sensor is found out and done without; moments nobody commanded are followed."""
+    """Inertial sensors that are stuck or show garbage are done without; unknown moments are followed."""
     flight = GuidedFlight(load_vehicle("iris"), 2, faults)
     flight.arm_and_take_off(5.0)
     began = flight.now

@@ -1,6 +1,8 @@
 """Faults: parsed with validation, timed, mapped from MAV_CMD_INJECT_FAILURE, applied."""
 
 import math
+from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from sitl_bridge.plant.faults import (
     Faults,
     LinkFault,
     ReleaseCable,
+    SensorFault,
     SetLoadMass,
     SetRotor,
     SetSensor,
@@ -356,6 +359,14 @@ def test_a_delay_before_the_first_command_leaves_a_vehicle_standing() -> None:
         assert not simulation.world.rotor_speed.any()
     simulation.step(np.array(simulation.world.trim_controls))
     assert simulation.world.rotor_speed[:4].all()
+
+
+def test_the_page_shows_every_failure_of_every_sensor() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
+    for sensor in get_args(SensorFault.model_fields["sensor"].annotation):
+        for failure in FAILURES:
+            if failure != "lost" or sensor == "gps":
+                assert f"\n| {sensor} {failure} |" in page
 
 
 def test_a_fault_that_the_vehicle_cannot_have_is_refused() -> None:
