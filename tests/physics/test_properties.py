@@ -199,6 +199,24 @@ def test_angular_momentum_of_a_fall(case: Case) -> None:
 
 @settings(max_examples=25)
 @given(cases())
+def test_any_flight_converges_with_the_fourth_power_of_the_step(case: Case) -> None:
+    """Halving the step divides the error by sixteen, whatever flies; against a step eight times finer."""
+    rate = fastest_rate(case, fly(case.record, case.state, case.rotor_speed, 1.0, force=case.force))
+    step = 2.0 ** math.floor(math.log2(min(0.2 / rate, 0.02)))
+
+    def end(step: float) -> Array:
+        steps = max(1, round(1.0 / step))
+        states = fly(case.record, case.state, case.rotor_speed, 1.0, step, steps, case.force)
+        return np.asarray(states[-1])
+
+    exact = end(step / 16)
+    coarse, fine = (float(np.linalg.norm(end(size) - exact)) for size in (step, step / 2))
+    assume(fine > 1e-9)  # above rounding
+    assert 3.5 < math.log2(coarse / fine) < 5.0
+
+
+@settings(max_examples=25)
+@given(cases())
 def test_quaternion_stays_of_unit_length(case: Case) -> None:
     states = flight(case)
     norms = np.linalg.norm(states[:, ATTITUDE], axis=1)

@@ -88,6 +88,38 @@ def test_consumer_figures_at_250_hz() -> None:
     np.testing.assert_allclose(std[6:9] / math.hypot(east, north), 0.05, rtol=0.02)
 
 
+@pytest.mark.parametrize("name", ["accelerometer", "gyroscope", "magnetometer", "barometer", "thermometer"])
+def test_each_channel_by_allan_deviation(name: str) -> None:
+    """White noise, random walk and steps of the reading, through the instrument, at a rate of its own.
+
+    Over tau seconds: N / sqrt(tau) of a density N, K sqrt(tau / 3) of a walk K; quantisation, which noise of
+    more than a step makes white, q² / 12 a reading.
+    """
+    rate, walk, step = 50.0, 0.02, 0.1
+    density = 0.03
+    figures = Instrument(noise_density=density, random_walk=walk, resolution=step, rate=rate)
+    first, axes = PLACES[name]
+    # A barometer's axes are pressure and the altitude made of it; its figures are in metres.
+    unit = abs(SLOPE) if name == "barometer" else 1.0
+    axes = 1 if name == "barometer" else axes
+    rows = np.concatenate(
+        [
+            record(Sensors(**{name: figures}), 100_000, seed=seed)[
+                :: round(RATE / rate), first : first + axes
+            ]
+            for seed in range(6 // axes)
+        ],
+        axis=1,
+    )
+    for tau in (0.02, 0.2, 2.0, 20.0):
+        size = round(tau * rate)
+        white = density**2 + step**2 / 12.0 / rate
+        expected = unit * math.sqrt(white / tau + walk**2 * tau / 3.0)
+        blocks = len(rows) / size * rows.shape[1]
+        measured = math.sqrt(np.mean(allan_deviation(rows, size) ** 2))
+        assert measured == pytest.approx(expected, rel=4.0 / math.sqrt(blocks) + 0.03)
+
+
 def test_density_not_deviation_is_kept_at_other_rates() -> None:
     std = np.std(record(suite("consumer"), 20_000, rate=1000.0)[:, :3], axis=0)
     np.testing.assert_allclose(std, 0.35 * 2.0, rtol=0.03)
