@@ -32,7 +32,13 @@ def build_parser() -> argparse.ArgumentParser:
         description="Launch plant and controller as two processes, fly a scenario and report on it. "
         "Exit code 0: the load settled; 1: it did not, or a process failed; 2: the command line is wrong.",
     )
-    fly.add_argument("scenario", metavar="SCENARIO", help="a scenario's name (see below) or .toml file")
+    fly.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        nargs="?",
+        default="setpoint",
+        help="a scenario's name (see below) or .toml file (default: %(default)s)",
+    )
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
     for add in (_vehicle, _link, _clock, _loop, _control, _seed, _ground, _output):
         add(fly)

@@ -196,10 +196,6 @@ class Estimator:
         """The vehicle stands on the ground, rotors stopped."""
         self._change(STANDING, int(self.memory["load_mode"]))
 
-    def load_on_cable(self) -> None:
-        """The load is (again) in the air on its cable."""
-        self._change(int(self.memory["vehicle_mode"]), LOAD_ON_CABLE)
-
     def load_on_ground(self) -> None:
         """The load lies on the ground."""
         self._change(int(self.memory["vehicle_mode"]), LOAD_ON_GROUND)

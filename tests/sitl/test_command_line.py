@@ -11,9 +11,18 @@ import numpy as np
 import pytest
 
 from sitl import bench, cli
+from sitl.arguments import build_parser
 from sitl.flight import new_folder
 from sitl.fly import FlightError
 from sitl.report import table, write_report
+
+
+def test_flying_alone_is_the_papers_experiment_whatever_options_stand_before() -> None:
+    parser = build_parser()
+    assert parser.parse_args(["fly"]).scenario == "setpoint"
+    assert parser.parse_args(["fly", "--json"]).scenario == "setpoint"
+    assert parser.parse_args(["fly", "--json", "hover"]).scenario == "hover"
+
 
 SCENARIO = """
 vehicle = "iris"
