@@ -6,9 +6,7 @@ import math
 from collections import deque
 from typing import NamedTuple
 
-import numpy as np
-
-from sitl_bridge.frames import Quaternion, Triple, rotate_inverse
+from sitl_bridge.frames import Triple, rotate_inverse
 from sitl_bridge.plant.sensors.instruments import GARBAGE, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
 from sitl_bridge.plant.streams import stream
@@ -31,17 +29,19 @@ def sighting(tracker: Tracker, x: Array, draw: Array, delay: float) -> Sighting 
     Noise is an angle across the line of sight, and a share of the distance along it.
     """
     w, qx, qy, qz = x[ATTITUDE].tolist()
-    attitude: Quaternion = (w, qx, qy, qz)
-    dx, dy, dz = (x[LOAD_POSITION] - x[VEHICLE_POSITION]).tolist()
-    seen = np.array(rotate_inverse(attitude, (dx, dy, dz)))
-    distance = float(np.linalg.norm(seen))
-    if distance == 0.0 or distance > tracker.range or -seen[2] < distance * math.cos(tracker.field_of_view):
+    vehicle, load = x[VEHICLE_POSITION].tolist(), x[LOAD_POSITION].tolist()
+    offset: Triple = (load[0] - vehicle[0], load[1] - vehicle[1], load[2] - vehicle[2])
+    px, py, pz = rotate_inverse((w, qx, qy, qz), offset)
+    distance = math.sqrt(px * px + py * py + pz * pz)
+    if distance == 0.0 or distance > tracker.range or -pz < distance * math.cos(tracker.field_of_view):
         return None
-    along = seen / distance
-    noise = distance * tracker.angle_noise * (draw - along * (along @ draw))
-    noise += distance * tracker.distance_noise * along * (along @ draw)
-    px, py, pz = (seen + noise).tolist()
-    return Sighting((px, py, pz), delay)
+    a, b, c = draw.tolist()
+    across = distance * tracker.angle_noise
+    # What the draw has along the line of sight is replaced by the noise of the distance.
+    share = (px * a + py * b + pz * c) / distance * (tracker.distance_noise - tracker.angle_noise)
+    return Sighting(
+        (px + across * a + share * px, py + across * b + share * py, pz + across * c + share * pz), delay
+    )
 
 
 def spoil(
