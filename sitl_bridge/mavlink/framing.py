@@ -255,6 +255,7 @@ class Packer:
         self.system = system
         self.component = component
         self.sequence = 0
+        self._writer = common.MAVLink(None, srcSystem=system, srcComponent=component)
 
     def next_sequence(self) -> int:
         """The sequence number for the next frame."""
@@ -264,9 +265,8 @@ class Packer:
 
     def pack(self, message: Any) -> bytes:
         """One MAVLink 2 frame of any pymavlink message."""
-        writer = common.MAVLink(None, srcSystem=self.system, srcComponent=self.component)
-        writer.seq = self.next_sequence()
-        return bytes(message.pack(writer))
+        self._writer.seq = self.next_sequence()
+        return bytes(message.pack(self._writer))
 
 
 _reader = common.MAVLink(None)

@@ -43,12 +43,16 @@ class HeldTable(ABC):
         """So many steps were taken, at most as many as were left."""
         if self.constant:
             return
-        self.next_step += steps
-        self.steps_left -= steps
+        self.count(steps)
         if self.steps_left == 0:
             self.begin()
         else:
             self.now[:] = self.table[self.next_step // self.hold_steps]
+
+    def count(self, steps: int) -> None:
+        """So many steps were taken, fewer than were left, and `now` is right already."""
+        self.next_step += steps
+        self.steps_left -= steps
 
     @abstractmethod
     def draw(self) -> None:

@@ -180,9 +180,9 @@ class World:
     def flown(self) -> None:
         """A tick was flown by `tick.exchange`."""
         if not self._force.constant:
-            self._force.advance(self.steps_per_tick)
+            self._force.count(self.steps_per_tick)
         if not self._wind.constant:
-            self._wind.advance(self.steps_per_tick)
+            self._wind.count(self.steps_per_tick)
 
     def battery(self, duration: float) -> BatteryReading | None:
         """Draw on the battery for `duration` seconds at the rotors' present speeds; None: there is none."""
