@@ -88,11 +88,12 @@ def estimate_metrics(
     truth = true_states(state_log)
     row, at = rows_at(times[late], logged[:, 0])
     error = errors(truth[late][row], logged[at, 1 : 1 + len(STATE_COLUMNS)])
+    # Both count from the alignment on: what they had counted when the steady part began is not of it.
+    judgements, within = logged[at[-1], -2:] - logged[at[0], -2:] if len(at) else (0.0, 0.0)
     row, at = rows_at(logged[at, 0], covariance_log["time_s"])
     judged = error[row][:, NEES_STATES]
     cov = covariances(covariance_log)[at][:, NEES_STATES[:, None], NEES_STATES]
     nees = np.einsum("ni,ni->n", judged, np.linalg.solve(cov, judged[:, :, None])[:, :, 0]) / len(NEES_STATES)
-    judgements, within = logged[-1, -2:] if len(logged) else (0.0, 0.0)
     return {
         "load_relative_rms_m": rms(error[:, LOAD_POSITION] - error[:, VEHICLE_POSITION]),
         "load_rms_m": rms((truth[:, LOAD_POSITION] - reference)[late]),

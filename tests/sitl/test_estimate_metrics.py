@@ -15,7 +15,7 @@ ROWS = 5001
 
 @pytest.fixture(scope="module")
 def logs() -> tuple[Log, Log, Log]:
-    """25 s at 200 Hz in which estimates err by drawn errors of known covariance."""
+    """25 s at 200 Hz in which estimates err by drawn errors of known covariance, the first 20 s surprised."""
     generator = np.random.default_rng(4)
     times = np.arange(ROWS) / 200.0
     euler = generator.uniform(-0.3, 0.3, (ROWS, 3))
@@ -26,7 +26,9 @@ def logs() -> tuple[Log, Log, Log]:
     )
     root = 0.1 * generator.standard_normal((18, 18))
     error = generator.standard_normal((ROWS, 18)) @ root.T
-    innovations = np.cumsum([[10.0, 9.0]] * ROWS, axis=0)
+    # While it finds its feet, fewer are in bounds.
+    within = np.where(times < 20.0, 2.0, 9.0)
+    innovations = np.cumsum(np.stack([np.full(ROWS, 10.0), within], axis=1), axis=0)
     estimate = np.hstack([times[:, None], truth - error, innovations])
     covariance = np.tile((root @ root.T)[UPPER], (ROWS // 10 + 1, 1))
     return (
@@ -62,6 +64,7 @@ def test_a_row_that_was_lost_shifts_nothing(logs: tuple[Log, Log, Log]) -> None:
     parts = estimate_metrics(state, fewer, covariance, load)
     assert parts["nees_mean"] == pytest.approx(whole["nees_mean"], rel=0.05)
     assert parts["load_relative_rms_m"] == pytest.approx(whole["load_relative_rms_m"], rel=0.01)
+    assert parts["innovations_in_bounds"] == pytest.approx(0.9)
 
 
 @pytest.mark.filterwarnings("error")
@@ -71,6 +74,8 @@ def test_what_no_row_tells_is_none(logs: tuple[Log, Log, Log]) -> None:
     early = {name: column[:1] for name, column in covariance.items()}
     assert estimate_metrics(state, estimate, early, load)["nees_mean"] is None
     empty = {name: column[:0] for name, column in estimate.items()}
+    only_early = {name: column[:100] for name, column in estimate.items()}
+    assert estimate_metrics(state, only_early, early, load)["innovations_in_bounds"] is None
     figures = estimate_metrics(state, empty, {name: column[:0] for name, column in covariance.items()}, load)
     assert figures == {
         "load_relative_rms_m": None,
