@@ -1,4 +1,10 @@
-"""The covariance over a million updates, the transition against differences, and the tick's cost."""
+"""The covariance over a million updates, the transition against differences, and a loop without allocation.
+
+What a tick costs is measured by `sitl bench` (`estimator_update_us`), not here: a test's machine may be busy.
+"""
+
+import gc
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -10,13 +16,14 @@ from scipy.spatial.transform import Rotation
 from controller.estimator.filter import Estimator, eq31_jacobian
 from controller.estimator.layout import ERROR_SIZE, LOAD_ON_CABLE, PARTS, SENSORS, X_LOAD, Array
 from controller.estimator.update import CORRECTION, SMALLEST_SWING, inject
+from sitl_bridge import compiled
 from sitl_bridge.vehicle import hover_rotor_speed
 from tests.estimator.flights import CONSUMER, PERIOD
 from tests.estimator.test_accuracy import paper
 
 
 def hovering(ticks: int, rest_length: float = 1.0) -> Estimator:
-    """A filter that hovers with sensors that read what it expects, but for the magnetometer's noise."""
+    """A filter that hovers with sensors that read what it expects, but for a tremor (see `load`)."""
     vehicle = paper(rest_length)
     estimator = Estimator(vehicle, PERIOD, CONSUMER)
     for k in range(200 + ticks):
@@ -30,14 +37,14 @@ def hovering(ticks: int, rest_length: float = 1.0) -> Estimator:
 
 
 def load(estimator: Estimator, k: int) -> None:
-    """Readings of a hover, never the same twice: what repeats itself is stuck, and not used."""
+    """Give tick k what the sensors read; one that repeats itself to the last digit would count as stuck."""
     east, north, up = CONSUMER.field
-    alive = 1e-3 * (k % 3 - 1)
-    estimator.imu((alive, 0.0, 9.81), (alive, 0.0, 0.0))
-    estimator.magnetometer((east + alive, north, up))
+    tremor = 1e-3 * (k % 3 - 1)
+    estimator.imu((tremor, 0.0, 9.81), (0.1 * tremor, 0.0, 0.0))
+    estimator.magnetometer((east + tremor, north, up))
     estimator.barometer(0.0)
     if k % 25 == 0:
-        estimator.gps(max(0.0, k * PERIOD - 0.108), (alive, 0.0, 0.0), (0.0, 0.0, 0.0))
+        estimator.gps(max(0.0, k * PERIOD - 0.108), (tremor, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def test_covariance_over_a_million_updates() -> None:
@@ -45,12 +52,13 @@ def test_covariance_over_a_million_updates() -> None:
     estimator = hovering(5000)
     steady = estimator.error_covariance.copy()
     m = estimator.memory
-    fused = int(m["nis_count"].sum())
+    fused, refused = int(m["nis_count"].sum()), m["rejected"].copy()
     k = 5200
     while int(m["nis_count"].sum()) - fused < 1_000_000:
         load(estimator, k)
         estimator.tick(k * PERIOD)
         k += 1
+    assert np.array_equal(m["rejected"], refused)  # all sensors took part
     cov = estimator.error_covariance
     scale = np.sqrt(np.diag(cov))
     known = scale > 0.0
@@ -60,6 +68,40 @@ def test_covariance_over_a_million_updates() -> None:
     assert np.all(np.diag(cov)[:12] <= 1.05 * np.diag(steady)[:12])
     assert np.all(np.isfinite(estimator.state()))
     assert m["rejected"].max() < 10  # at take-off; or not everything was fused
+
+
+def test_ticks_neither_keep_memory_nor_compile(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thousands of ticks, with every kind of update, keep no more memory than a few do, and compile nothing.
+
+    The build refuses machine code that allocates, so what could grow is on Python's side of the call.
+    """
+    estimator = hovering(2000)
+    at = 2200
+
+    def run(ticks: int) -> int:
+        """Bytes that so many ticks keep."""
+        nonlocal at
+        gc.collect()
+        before = tracemalloc.get_traced_memory()[0]
+        for k in range(at, at + ticks):
+            load(estimator, k)
+            estimator.tick(k * PERIOD)
+            estimator.command(speeds)
+        at += ticks
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0] - before
+
+    def refuse(entry: compiled.EntryPoint) -> None:
+        raise AssertionError(f"{entry.name} is loaded or compiled in the loop")
+
+    monkeypatch.setattr(compiled.EntryPoint, "_load", refuse)
+    speeds = np.full(4, hover_rotor_speed(estimator.vehicle))
+    tracemalloc.start()
+    try:
+        run(100)  # what is kept once, a number or two
+        assert run(4000) < 1000  # a quarter of a byte a tick: nothing that is kept at each could hide in it
+    finally:
+        tracemalloc.stop()
 
 
 @given(hnp.arrays(float, 3, elements=st.floats(-0.5, 0.5)), st.integers(0, 2**32 - 1))
