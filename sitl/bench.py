@@ -83,7 +83,10 @@ def datagram_sizes(vehicle: Vehicle) -> tuple[int, int]:
 
 
 def estimator_update_us(vehicle: Vehicle) -> float:
-    """Median time of the estimator's tick, us: inertial sensors, magnetometer, barometer; GPS at its rate."""
+    """Median time of the estimator's tick, us: inertial sensors, magnetometer, barometer; GPS at its rate.
+
+    Fixes come as late as the vehicle's receiver gives them, so that they correct an instant that is past.
+    """
     from controller.estimate_feedback import tuning_for
     from controller.estimator.filter import Estimator
     from sitl_bridge.vehicle import hover_rotor_speeds
@@ -91,16 +94,20 @@ def estimator_update_us(vehicle: Vehicle) -> float:
     tuning = tuning_for(vehicle, DEFAULT_RATE_HZ)
     estimator = Estimator(vehicle, 1.0 / DEFAULT_RATE_HZ, tuning)
     speeds = np.array(hover_rotor_speeds(vehicle))
-    still, up = (0.0, 0.0, 0.0), (0.0, 0.0, vehicle.gravity)
+    still = (0.0, 0.0, 0.0)
+    spread = round(DEFAULT_RATE_HZ * tuning.gps_period)
+    late = round(DEFAULT_RATE_HZ * vehicle.sensors.gps.delay)
     times = []
     for tick in range(STEPS // 2):
         now = tick / DEFAULT_RATE_HZ
         east, north, height = tuning.field
-        estimator.imu(up, still)
-        estimator.magnetometer((east + 1e-9 * (tick % 3), north, height))
+        # A sensor that repeats itself to the last digit is taken for stuck, and would not be used.
+        tremor = 1e-9 * (tick % 3)
+        estimator.imu((tremor, 0.0, vehicle.gravity), (tremor, 0.0, 0.0))
+        estimator.magnetometer((east + tremor, north, height))
         estimator.barometer(0.0)
-        if tick % round(DEFAULT_RATE_HZ * tuning.gps_period) == 0:
-            estimator.gps(now, still, still)
+        if tick >= late and (tick - late) % spread == 0:
+            estimator.gps((tick - late) / DEFAULT_RATE_HZ, still, still)
         began = time.perf_counter()
         estimator.tick(now)
         times.append(time.perf_counter() - began)
