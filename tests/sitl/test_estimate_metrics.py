@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -89,3 +92,16 @@ def test_angles_differ_the_short_way_round() -> None:
     truth, estimate = np.zeros((1, 18)), np.zeros((1, 18))
     truth[0, 17], estimate[0, 17] = 3.1, -3.1
     assert errors(truth, estimate)[0, 17] == pytest.approx(6.2 - 2.0 * np.pi)
+
+
+def test_the_page_explains_the_figures_and_the_columns(logs: tuple[Log, Log, Log]) -> None:
+    state, estimate, covariance = logs
+    load = np.stack([state[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    page = (Path(__file__).resolve().parents[2] / "docs" / "estimator.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`(\w+)`", page))
+    figures = {*estimate_metrics(state, estimate, covariance, load), "load_relative_bound_m"}
+    assert figures <= named
+    whole = [name for name in COLUMNS if not re.search(r"_v?[yzqr]_", name)]  # the rest by its ending
+    assert set(whole) <= named
+    assert {re.sub(r"^\w*(?=_v?[yzqr]_)", "", name) for name in COLUMNS if name not in whole} <= named
+    assert {COVARIANCE_COLUMNS[0], COVARIANCE_COLUMNS[1], COVARIANCE_COLUMNS[-1]} <= named
