@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 
 from controller.designs import design, paper_weights
 from controller.lqr import sampled_gain, sampled_model
-from controller.model import linear_model, with_integrator
+from controller.model import LinearModel, linear_model, with_integrator
 from controller.reference import setpoint
 from sitl.metrics import overshoot_pct, settling_time
-from sitl.paper import offline, page, plots, second
+from sitl.paper import offline, page, plots, riccati, second
 from sitl.paper.context import Context
 from sitl.paper.flights import Request
-from sitl.paper.linear import damping_ratio, gains, open_loop_modes
+from sitl.paper.linear import damping_ratio, gains, hover_point, open_loop_modes
+from sitl.paper.page import Cell
 from sitl.paper.position import TARGET, law
-from sitl.paper.record import CORRECTED, UNSUPPORTED
+from sitl.paper.record import CORRECTED, UNSUPPORTED, Ledger
 from sitl.paper.sampling import held, spectral_radius
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.vehicle import Vehicle
@@ -38,6 +39,9 @@ OTHERS: dict[str, tuple[str, tuple[float, ...]]] = {
 DURATION = 15.0
 """s"""
 RATE_HZ = offline.RATE_HZ
+FAST_HZ = 1000.0
+"""Where the continuous gains, held, are stable without delay."""
+CHOSEN = "chosen: a value of the sweep, not a result"
 BASE = ("cable.rest_length=10",)
 """V.B's cable; everything else is Table I's."""
 
@@ -61,21 +65,115 @@ class Response(NamedTuple):
     """N"""
     diverged: bool
 
-    def row(self) -> dict[str, Any]:
-        """For paper.json."""
-        return {
-            "stretch_m": self.stretch,
-            "bounce_pole_1_s": self.bounce,
-            "bounce_frequency_hz": abs(self.bounce) / (2.0 * math.pi),
-            "bounce_damping_ratio": damping_ratio(self.bounce),
-            "pendulum_frequency_hz": self.pendulum / (2.0 * math.pi),
-            "bounce_pole_closed_loop_1_s": self.bounce_closed,
-            "bounce_damping_ratio_closed_loop": damping_ratio(self.bounce_closed),
-            "settling_time_2pct_s": self.settling,
-            "overshoot_pct": self.overshoot,
-            "peak_tension_N": self.peak_tension,
-            "diverged": self.diverged,
-        }
+
+ROW = (
+    "stretch_m",
+    "bounce_frequency_hz",
+    "bounce_damping_ratio",
+    "bounce_damping_ratio_closed_loop",
+    "pendulum_frequency_hz",
+    "settling_time_2pct_s",
+    "overshoot_pct",
+    "peak_tension_N",
+)
+"""What the page's tables show of a row, in their order."""
+ROW_HEAD = (
+    "stretch [m]",
+    "bounce [Hz]",
+    "its damping ratio",
+    "in closed loop",
+    "pendulum [Hz]",
+    "2 % settling [s]",
+    "overshoot [%]",
+    "peak tension [N]",
+)
+LINMOD_TOLERANCE = 1e-4
+"""Of frequencies (relative) and damping ratios against those of a Jacobian taken by differences."""
+
+
+def record(ledger: Ledger, key: str, vehicle: Vehicle, found: Response) -> None:
+    """Put a response under `key`, each figure beside the same of a second computation.
+
+    Open-loop modes: eigenvalues of the second simulation's Jacobian. The closed loop's: the symplectic
+    pencil. Settling, overshoot and tension: the same law, sampled, in the second simulation.
+    """
+    poles = np.linalg.eigvals(second.jacobians(vehicle, hover_point(vehicle), hover_wrench(vehicle))[0])
+    bounce, pendulum = nearest(poles, found.bounce), nearest(poles, 1j * found.pendulum)
+    model = with_integrator(linear_model(vehicle))
+    optimum = riccati.sampled(sampled_model(model, paper_weights(), 1.0 / RATE_HZ))
+    closed = nearest(np.log(optimum.poles) * RATE_HZ, found.bounce_closed)
+    other = fly_again(vehicle, optimum.gain)
+    linmod, pencil, again = (
+        "second simulation's linmod",
+        "symplectic pencil",
+        "the same law in the second simulation",
+    )
+    weight = vehicle.load.mass * vehicle.gravity
+    ledger.check(f"{key}.stretch_m", found.stretch, weight / vehicle.cable.stiffness, 1e-9, "m", "m_p g/k_a")
+    for name, pole, expected, source in (
+        ("bounce_pole_1_s", found.bounce, bounce, linmod),
+        ("bounce_pole_closed_loop_1_s", found.bounce_closed, closed, pencil),
+    ):
+        ledger.check_array(f"{key}.{name}", pole, expected, LINMOD_TOLERANCE * abs(pole), "1/s", source)
+    for name, pole, expected in (
+        ("bounce", found.bounce, bounce),
+        ("pendulum", 1j * found.pendulum, pendulum),
+    ):
+        frequency = abs(pole) / (2.0 * math.pi)
+        within = LINMOD_TOLERANCE * frequency
+        ledger.check(
+            f"{key}.{name}_frequency_hz", frequency, abs(expected) / (2.0 * math.pi), within, "Hz", linmod
+        )
+    for name, pole, expected, source in (
+        ("bounce_damping_ratio", found.bounce, bounce, linmod),
+        ("bounce_damping_ratio_closed_loop", found.bounce_closed, closed, pencil),
+    ):
+        ratio = damping_ratio(pole)
+        ledger.check(f"{key}.{name}", ratio, damping_ratio(expected), LINMOD_TOLERANCE, "", source)
+    ledger.same(f"{key}.diverged", found.diverged, other.diverged, again)
+    name = f"{key}.settling_time_2pct_s"
+    if found.settling is None or other.settling is None:
+        ledger.same(name, found.settling, other.settling, again)
+    else:
+        ledger.check(name, found.settling, other.settling, 0.008, "s", again)
+    ledger.check(f"{key}.overshoot_pct", found.overshoot, other.overshoot, 0.01, "%", again)
+    ledger.check(f"{key}.peak_tension_N", found.peak_tension, other.peak_tension, 0.01, "N", again)
+
+
+def nearest(poles: Any, wanted: complex) -> complex:
+    """That of the poles which is nearest."""
+    return complex(poles[np.argmin(np.abs(poles - wanted))])
+
+
+class Step(NamedTuple):
+    """What V.B came to."""
+
+    settling: float | None
+    """2 %, s; None: not settled"""
+    overshoot: float
+    """%"""
+    peak_tension: float
+    """N"""
+    diverged: bool
+
+
+def step_of(run: second.Run | offline.Motion, tension: Array) -> Step:
+    """V.B's figures of a run and the cable's tension in it (n,), N."""
+    error = np.linalg.norm(run.load - np.array(TARGET), axis=1)
+    return Step(
+        settling=None if run.diverged else settling_time(run.time, error, 0.02 * float(error[0])),
+        overshoot=overshoot_pct(run.load, run.load[0], np.array(TARGET)) or 0.0,
+        peak_tension=float(tension.max()),
+        diverged=run.diverged,
+    )
+
+
+def fly_again(vehicle: Vehicle, gain: Array) -> Step:
+    """V.B in the second simulation, with a sampled gain (4, 21), and without rotor limits."""
+    u_star = np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0])
+    law = second.Law(gain, hover_point(vehicle), u_star, lambda _: TARGET)
+    run = second.fly_sampled(vehicle, law, 1.0 / RATE_HZ, round(DURATION * RATE_HZ), steps=2)
+    return step_of(run, offline.cable_tension(vehicle, run.states))
 
 
 def requests(quick: bool) -> list[Request]:
@@ -111,17 +209,23 @@ def respond(vehicle: Vehicle, name: str = "paper") -> Response:
     run = offline.closed_loop(
         vehicle, design(name, vehicle, RATE_HZ), setpoint(TARGET, (0.0, 0.0, 0.0)), DURATION
     )
-    error = np.linalg.norm(run.load - np.array(TARGET), axis=1)
     return Response(
         bounce=bounce,
         pendulum=pendulum.imag,
-        bounce_closed=complex(closed[np.argmin(np.abs(closed - bounce))]),
+        bounce_closed=nearest(closed, bounce),
         stretch=vehicle.hover_length - vehicle.cable.rest_length,
-        settling=None if run.diverged else settling_time(run.time, error, 0.02 * float(error[0])),
-        overshoot=overshoot_pct(run.load, run.load[0], np.array(TARGET)) or 0.0,
-        peak_tension=float(run.tension.max()),
-        diverged=run.diverged,
+        **step_of(run, run.tension)._asdict(),
     )
+
+
+def settling_by_fast_sampling(vehicle: Vehicle) -> float:
+    """The same, in the plant with its rotor limits, the continuous gains held at FAST_HZ."""
+    gain, _ = gains(vehicle, integral=True)
+    held_gains = design("paper", vehicle, FAST_HZ)
+    held_gains["state_gain"], held_gains["integral_gain"] = gain[:, :18], gain[:, 18:]
+    path = setpoint(TARGET, (0.0, 0.0, 0.0))
+    run = offline.closed_loop(vehicle, held_gains, path, DURATION, FAST_HZ)
+    return step_of(run, run.tension).settling or math.inf
 
 
 def _stiffness(context: Context) -> str:
@@ -129,9 +233,13 @@ def _stiffness(context: Context) -> str:
     context.say("elasticity: stiffness")
     stiffnesses = FEW_STIFFNESSES if context.quick else STIFFNESSES
     responses = {k: respond(on(f"cable.stiffness={k!r}")) for k in stiffnesses}
-    ledger.put("elasticity", [{"stiffness_N_m": k, **r.row()} for k, r in responses.items()])
+    ledger.rows("elasticity", len(responses))
+    for i, (k, r) in enumerate(responses.items()):
+        ledger.put(f"elasticity.{i}.stiffness_N_m", k, "N/m", CHOSEN)
+        record(ledger, f"elasticity.{i}", on(f"cable.stiffness={k!r}"), r)
     context.say("elasticity: three stiffnesses over the link")
-    flown_rows = []
+    flown_rows: list[tuple[float, float, float]] = []
+    flown_cells: list[tuple[str | Cell, ...]] = []
     for k, flight in zip(FLOWN, context.pilot.fly(requests(context.quick)), strict=True):
         error = np.linalg.norm(flight.load - np.array(TARGET), axis=1)
         settled = settling_time(flight.time, error, 0.02 * float(error[0])) or math.inf
@@ -141,13 +249,19 @@ def _stiffness(context: Context) -> str:
         )
         peak = float(flight.tension.max())
         ledger.check(f"{key}.peak_tension_N", peak, r.peak_tension, 0.05, "N", "the sweep, offline")
-        flown_rows.append((k, settled, r.settling, peak, r.peak_tension))
+        flown_rows.append((k, settled, peak))
+        row = f"elasticity.{stiffnesses.index(k)}"
+        keys = ("settling_time_2pct_s", "peak_tension_N")
+        flown_cells.append((f"{k:g}", *(Cell(f"{place}.{name}") for name in keys for place in (key, row))))
     table, stiffest = responses, responses[1e5]
     compared = (100.0, 1e5) if context.quick else stiffnesses
     continuous = {k: settling_by_continuous_law(on(f"cable.stiffness={k!r}")) for k in compared}
-    ledger.put(
-        "elasticity_findings.settling_continuous_gains_s", {f"{k:.0f}_N_m": v for k, v in continuous.items()}
-    )
+    settling = "elasticity_findings.settling_continuous_gains_s"
+    for k, seconds in continuous.items():
+        again = settling_by_fast_sampling(on(f"cable.stiffness={k!r}"))
+        ledger.check(
+            f"{settling}.{k:.0f}_N_m", seconds, again, 0.05, "s", f"the plant, held at {FAST_HZ:g} Hz"
+        )
     change = continuous[1e5] - continuous[100.0]
     ledger.at_most("elasticity_findings.settling_1e5_minus_100_N_m_s", change, 0.1, "s", "errata.md: as fast")
     moved = max(abs(r.bounce_closed - r.bounce) / abs(r.bounce) for k, r in table.items() if k >= 100.0)
@@ -156,13 +270,17 @@ def _stiffness(context: Context) -> str:
     )
     heights = {}
     for name, vehicle in (("100_N_m", on()), ("1e5_N_m", on("cable.stiffness=1e5"))):
-        gain, model = gains(vehicle, integral=True)
-        sampled = sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ)).state
-        heights[name] = {
-            "continuous_N_m": [float(gain[0, 2]), float(gain[0, 5])],
-            "at_250_hz_N_m": [float(sampled[0, 2]), float(sampled[0, 5])],
+        continuous_gain, model = gains(vehicle, integral=True)
+        cost = sampled_model(model, paper_weights(), 1.0 / RATE_HZ)
+        found = {
+            "continuous_N_m": (continuous_gain, riccati.continuous(model, paper_weights()).gain),
+            "at_250_hz_N_m": (sampled_gain(cost).state, riccati.sampled(cost).gain),
         }
-    ledger.put("elasticity_findings.thrust_gain_on_heights_of_vehicle_and_load", heights)
+        for kind, (made, twice) in found.items():
+            key = f"elasticity_findings.thrust_gain_on_heights_of_vehicle_and_load.{name}.{kind}"
+            both = "eigenvectors of the Hamiltonian"
+            ledger.check_array(key, made[0, [2, 5]], twice[0, [2, 5]], 1e-5, "N/m", both)
+        heights[name] = {kind: made[0, [2, 5]].tolist() for kind, (made, _) in found.items()}
     ledger.judge(
         "elasticity.faster",
         "VII",
@@ -184,21 +302,11 @@ def _stiffness(context: Context) -> str:
         "shown here over k_a, c_a, l₀ and m_p",
         ["elasticity_findings", "elasticity_flown"],
     )
-    rows = [
-        (
-            k,
-            r.stretch,
-            abs(r.bounce) / (2 * math.pi),
-            damping_ratio(r.bounce),
-            damping_ratio(r.bounce_closed),
-            r.pendulum / (2 * math.pi),
-            r.settling,
-            continuous.get(k, ""),
-            r.overshoot,
-            r.peak_tension,
-        )
-        for k, r in table.items()
-    ]
+    rows: list[tuple[str | Cell, ...]] = []
+    for i, k in enumerate(table):
+        cells: list[str | Cell] = [Cell(f"elasticity.{i}.{key}") for key in ROW]
+        beside = Cell(f"{settling}.{k:.0f}_N_m") if k in continuous else ""
+        rows.append((f"{k:g}", *cells[:6], beside, *cells[6:]))
     return (
         page.text(
             "The experiment is V.B (l₀ = 10 m, Table I otherwise), the paper's weights, gains designed "
@@ -213,21 +321,7 @@ def _stiffness(context: Context) -> str:
             "<b>Over the stiffness k_a.</b> Dots: the sweep; rings: flown over the link.",
             [request.command for request in requests(context.quick)],
         )
-        + page.table(
-            (
-                "k_a [N/m]",
-                "stretch [m]",
-                "bounce [Hz]",
-                "its damping ratio",
-                "in closed loop",
-                "pendulum [Hz]",
-                "2 % settling [s]",
-                "with continuous gains [s]",
-                "overshoot [%]",
-                "peak tension [N]",
-            ),
-            rows,
-        )
+        + page.table(ledger, ("k_a [N/m]", *ROW_HEAD[:6], "with continuous gains [s]", *ROW_HEAD[6:]), rows)
         + page.text(
             f"At 1e5 N/m and {RATE_HZ:g} Hz settling takes {page.number(stiffest.settling)} s, not for the "
             "cable's sake: in "
@@ -244,8 +338,9 @@ def _stiffness(context: Context) -> str:
         )
         + page.text("Flown over the link, beside the sweep:")
         + page.table(
+            ledger,
             ("k_a [N/m]", "2 % settling, flown [s]", "offline [s]", "peak tension, flown [N]", "offline [N]"),
-            flown_rows,
+            flown_cells,
         )
     )
 
@@ -256,41 +351,38 @@ def _others(context: Context) -> str:
     for key, (label, values) in OTHERS.items():
         context.say(f"elasticity: {key}")
         some = (values[0], values[-1]) if context.quick else values
-        rows, table = [], []
-        for value in some:
-            r = respond(on(f"{key}={value!r}"))
-            table.append({key.replace(".", "_"): value, **r.row()})
-            rows.append(
-                (
-                    value,
-                    r.stretch,
-                    abs(r.bounce) / (2 * math.pi),
-                    damping_ratio(r.bounce),
-                    damping_ratio(r.bounce_closed),
-                    r.pendulum / (2 * math.pi),
-                    "diverges" if r.diverged else r.settling,
-                    r.overshoot,
-                    r.peak_tension,
-                )
-            )
-        ledger.put(f"elasticity_over.{key.replace('.', '_')}", table)
-        blocks.append(
-            page.table(
-                (
-                    label,
-                    "stretch [m]",
-                    "bounce [Hz]",
-                    "its damping ratio",
-                    "in closed loop",
-                    "pendulum [Hz]",
-                    "2 % settling [s]",
-                    "overshoot [%]",
-                    "peak tension [N]",
-                ),
-                rows,
-            )
-        )
+        rows: list[tuple[str | Cell, ...]] = []
+        parameter = key.replace(".", "_")
+        name = f"elasticity_over.{parameter}"
+        ledger.rows(name, len(some))
+        for i, value in enumerate(some):
+            vehicle = on(f"{key}={value!r}")
+            ledger.put(f"{name}.{i}.{parameter}", value, "", CHOSEN)
+            response = respond(vehicle)
+            record(ledger, f"{name}.{i}", vehicle, response)
+            cells: list[str | Cell] = [Cell(f"{name}.{i}.{column}") for column in ROW]
+            if response.diverged:
+                cells[ROW.index("settling_time_2pct_s")] = "diverges"
+            rows.append((f"{value:g}", *cells))
+        blocks.append(page.table(ledger, (label, *ROW_HEAD), rows))
     return "".join(blocks)
+
+
+def crossed_growths_again(vehicles: Sequence[Vehicle]) -> Array:
+    """The same from the second simulation's Jacobians, and gains without a Riccati solver."""
+    models = [
+        with_integrator(LinearModel(*second.jacobians(v, hover_point(v), hover_wrench(v)))) for v in vehicles
+    ]
+    period = 1.0 / RATE_HZ
+    made = [riccati.sampled(sampled_model(model, paper_weights(), period)).gain for model in models]
+    loops = [held(model, period) for model in models]
+    radii = [[np.abs(np.linalg.eigvals(a - b @ gain)).max() for a, b in loops] for gain in made]
+    return np.asarray(np.log(np.array(radii)) * RATE_HZ)
+
+
+def hover_wrench(vehicle: Vehicle) -> second.Wrench:
+    """u* of a vehicle."""
+    return vehicle.hover_thrust, 0.0, 0.0, 0.0
 
 
 def crossed_growths(vehicles: Sequence[Vehicle]) -> Array:
@@ -310,10 +402,12 @@ def _crossed(context: Context) -> str:
         ("cable.stiffness", "k_a [N/m]", (20.0, 50.0, 100.0, 300.0, 1e3, 1e4, 1e5)),
         ("cable.rest_length", "l₀ [m]", (0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0)),
     ):
-        growths = crossed_growths([on(f"{key}={value!r}") for value in values])
+        vehicles = [on(f"{key}={value!r}") for value in values]
+        growths, again = crossed_growths(vehicles), crossed_growths_again(vehicles)
         name = f"elasticity_crossed.{key.replace('.', '_')}"
-        ledger.put(f"{name}.values", values)
-        ledger.put(f"{name}.growth_1_s", growths)
+        ledger.put(f"{name}.values", values, label.split("[")[1].rstrip("]"), CHOSEN)
+        source = "second simulation's linmod, gains from the symplectic pencil"
+        ledger.check_array(f"{name}.growth_1_s", growths, again, 1e-3, "1/s", source)
         ledger.at_most(
             f"{name}.largest_growth_on_its_own_cable_1_s", float(np.diag(growths).max()), -0.1, "1/s", "own"
         )
@@ -325,7 +419,8 @@ def _crossed(context: Context) -> str:
             ledger.at_least(
                 f"{name}.growth_of_10_on_1_1_s", float(growths[ten, one]), 1e-3, "1/s", "errata.md, V.B"
             )
-        stable = int(ledger.put(f"{name}.stable_pairs", int(np.sum(growths < 0.0))))
+        stable = int(np.sum(growths < 0.0))
+        ledger.check(f"{name}.stable_pairs", stable, int(np.sum(again < 0.0)), 0, "", source)
         blocks.append(
             page.figure(
                 _draw_crossed(growths, values, label),
@@ -369,7 +464,7 @@ def _draw_stiffness(table: dict[float, Response], flown: Sequence[Sequence[Any]]
     ax = axes[1, 1]
     ax.semilogx(ks, [r.peak_tension for r in table.values()], ".-", color=plots.CABLE, label="offline")
     ax.semilogx(
-        [row[0] for row in flown], [row[3] for row in flown], color=plots.CABLE, label="flown", **rings
+        [row[0] for row in flown], [row[2] for row in flown], color=plots.CABLE, label="flown", **rings
     )
     ax.axhline(98.1, color=plots.NEUTRAL, lw=1.0, label="weight of the load")
     ax.set(xlabel="stiffness k_a [N/m]", ylabel="peak tension [N]", ylim=(0, None))

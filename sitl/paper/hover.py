@@ -8,6 +8,7 @@ import numpy as np
 
 from sitl.paper import page, second
 from sitl.paper.context import Context
+from sitl.paper.page import Cell
 from sitl.paper.record import CORRECTED, UNSUPPORTED
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
@@ -33,8 +34,11 @@ def section(context: Context) -> str:
         "rad/s",
         "errata.md, eq. 24",
     )
-    ledger.put("equilibrium.x", [0.0, 0.0, length, *[0.0] * 15])
-    ledger.put("equilibrium.u", [thrust, 0.0, 0.0, 0.0])
+    x, u = [0.0, 0.0, length, *[0.0] * 15], [thrust, 0.0, 0.0, 0.0]
+    ledger.check_array(
+        "equilibrium.x", x, [0.0, 0.0, 1.981, *[0.0] * 15], 1e-9, "eq. 31", "errata.md, eq. 17"
+    )
+    ledger.check_array("equilibrium.u", u, [196.2, 0.0, 0.0, 0.0], 1e-9, "N, N m", "eq. 19")
     residual = max(abs(a) for a in accelerations(vehicle, length, thrust))
     ledger.at_most("equilibrium.residual_acceleration_m_s2", residual, 1e-12, "m/s²", "eq. 16")
 
@@ -63,6 +67,8 @@ def section(context: Context) -> str:
     )
     share = 4 * rotor.thrust_coefficient * printed_speed**2 / thrust
     ledger.check("hover.printed_rotor_speed_thrust_ratio", share, 4.0, 1e-9, "", "errata.md, eq. 24")
+    lift = 4 * rotor.thrust_coefficient * speed**2
+    ledger.check("hover.thrust_of_four_rotors_N", lift, thrust, 1e-9, "N", "eq. 20")
     top, bottom = PRINTED_POINT
     up, down = accelerations(vehicle, top - bottom, thrust)
     ledger.check("hover.printed_point_vehicle_acceleration_m_s2", up, -0.19, 1e-9, "m/s²", "errata.md, IV.A")
@@ -105,14 +111,23 @@ def section(context: Context) -> str:
         "l = 2 m is rounded from 1.981 m",
         ["hover.printed_point_vehicle_acceleration_m_s2", "hover.printed_point_load_acceleration_m_s2"],
     )
-    rows = [
-        ("17", "l = l₀ - m_p g/k_a", printed_length, "l = l₀ + m_p g/k_a", length, "m"),
-        ("18, 19", "T = (m_v + m_p) g", thrust, "the same", thrust, "N"),
-        ("20", "c_t Σω² = T", thrust, "the same", 4 * rotor.thrust_coefficient * speed**2, "N"),
-        ("21, 22", "ω₂ = ω₄, ω₁ = ω₃", 0.0, "the same", 0.0, "N m"),
-        ("23", "d c_q (…) = 0", 0.0, "c_q (…) = 0: same root, and d = 1 m in Table I", 0.0, "N m"),
-        ("24", "√((m_v+m_p) g/c_t)", printed_speed, "√((m_v+m_p) g/(4 c_t))", speed, "rad/s"),
-        ("25", "z_vss - z_pss, by simulation", None, "the same", found, "m"),
+    full, printed = Cell("equilibrium.thrust_N"), Cell("hover.printed_length_m")
+    fast, right = Cell("hover.printed_rotor_speed_rad_s"), Cell("equilibrium.rotor_speed_rad_s")
+    rows: list[tuple[str | Cell, ...]] = [
+        ("17", "l = l₀ - m_p g/k_a", printed, "l = l₀ + m_p g/k_a", Cell("equilibrium.length_m"), "m"),
+        ("18, 19", "T = (m_v + m_p) g", full, "the same", full, "N"),
+        ("20", "c_t Σω² = T", full, "the same", Cell("hover.thrust_of_four_rotors_N"), "N"),
+        ("21, 22", "ω₂ = ω₄, ω₁ = ω₃", "", "the same", "", ""),
+        ("23", "d c_q (…) = 0", "", "c_q (…) = 0: same root, and d = 1 m in Table I", "", ""),
+        ("24", "√((m_v+m_p) g/c_t)", fast, "√((m_v+m_p) g/(4 c_t))", right, "rad/s"),
+        (
+            "25",
+            "z_vss - z_pss, by simulation",
+            "",
+            "the same",
+            Cell("hover.steady_length_by_simulation_m"),
+            "m",
+        ),
     ]
     return (
         page.text(
@@ -124,7 +139,7 @@ def section(context: Context) -> str:
             "over, "
             f"growing by {page.number(growth)} 1/s."
         )
-        + page.table(("eq.", "as printed", "value", "corrected", "value", "unit"), rows)
+        + page.table(ledger, ("eq.", "as printed", "value", "corrected", "value", "unit"), rows)
         + page.text(
             f"Rotors at the printed speed of eq. 24 would give {page.number(share)} times hover thrust. "
             "The point "

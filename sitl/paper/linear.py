@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from controller.designs import paper_lqr_weights, paper_weights
 from controller.lqr import continuous_gain
 from controller.model import LinearModel, linear_model, with_integrator
-from sitl.paper import page, plots, second
+from sitl.paper import page, plots, riccati, second
 from sitl.paper.context import Context
+from sitl.paper.page import Cell
 from sitl.paper.record import CORRECTED, UNSUPPORTED
 from sitl_bridge.description import load_vehicle
 from sitl_bridge.vehicle import Vehicle
@@ -79,10 +80,13 @@ def _appendix_f(context: Context) -> str:
     thrust = vehicle.hover_thrust
     printed_a, printed_b = printed_matrices()
     at_printed, true = linear_model(vehicle, PRINTED_LENGTH, 196.2), linear_model(vehicle)
-    ledger.put("A.printed", at_printed.A)
-    ledger.put("A.true", true.A)
-    ledger.put("B", true.B)
+    wrench = (thrust, 0.0, 0.0, 0.0)
     source = "Appendix F"
+    linmod = {at: second.jacobians(vehicle, hover_point(vehicle, at), wrench) for at in lengths(vehicle)}
+    ledger.check_array("A.printed", at_printed.A, printed_a, 1e-12, "", source + "1")
+    numeric, _ = linmod[vehicle.hover_length]
+    ledger.check_array("A.true", true.A, numeric, 1e-6, "", "second simulation's linmod")
+    ledger.check_array("B", true.B, printed_b, 1e-12, "", source + "1")
     a_error = float(np.abs(at_printed.A - printed_a).max())
     ledger.at_most("appendix_f.A_largest_difference_from_F1", a_error, 1e-12, "", source + "1")
     ledger.at_most(
@@ -90,10 +94,8 @@ def _appendix_f(context: Context) -> str:
     )
     b_error = float(np.abs(true.B - printed_b).max())
     ledger.at_most("appendix_f.B_largest_difference_from_F1", b_error, 1e-12, "", source + "1")
-    wrench = (thrust, 0.0, 0.0, 0.0)
     worst = 0.0
-    for model, length in ((at_printed, PRINTED_LENGTH), (true, vehicle.hover_length)):
-        a, b = second.jacobians(vehicle, hover_point(vehicle, length), wrench)
+    for model, (a, b) in zip((at_printed, true), linmod.values(), strict=True):
         worst = max(worst, float(np.abs(a - model.A).max()), float(np.abs(b - model.B).max()))
     ledger.at_most(
         "appendix_f.largest_difference_from_numeric_jacobian", worst, 1e-6, "", "second simulation's linmod"
@@ -118,19 +120,27 @@ def _appendix_f(context: Context) -> str:
         rows.append(
             (
                 f"[d{STATES[i]}/dt, {STATES[j]}]",
-                printed_a[i, j],
-                at_printed.A[i, j].item(),
-                true.A[i, j].item(),
+                f"{printed_a[i, j]:g}",
+                Cell(f"A.printed.{i}.{j}"),
+                Cell(f"A.true.{i}.{j}"),
             )
         )
     return page.text(
         "Our Jacobian is written down by hand; a numerical one of the second simulation (what linmod does) "
         "agrees "
         f"with it to {worst:.0e}. At the paper's point it is Appendix F1 and F2, entry by entry "
-        f"(largest difference {max(a_error, b_error):.0e}). Below: all entries that are not kinematic."
+        f"(largest difference {max(a_error, b_error):.0e}). Below: all entries that "
+        "are not kinematic."
     ) + page.table(
-        ("entry of A", "App. F1, F2", "ours at l = 2 m", f"at l = {vehicle.hover_length:g} m"), rows
+        ledger,
+        ("entry of A", "App. F1, F2", "ours at l = 2 m", f"at l = {vehicle.hover_length:g} m"),
+        rows,
     )
+
+
+def lengths(vehicle: Vehicle) -> tuple[float, float]:
+    """The lengths that the model is linearised at, m: the paper's, and the true equilibrium's."""
+    return PRINTED_LENGTH, vehicle.hover_length
 
 
 def exact_model(vehicle: Vehicle) -> tuple[Rational, Rational]:
@@ -202,7 +212,12 @@ def _controllability(context: Context) -> str:
     condition = float(np.linalg.cond(floating))
     exponent = math.log10(condition)
     ledger.check("controllability.log10_condition", exponent, 11.0, 1.0, "", "errata.md: about 1e11")
-    ledger.put("controllability.floating_point_rank", int(np.linalg.matrix_rank(floating)))
+    ledger.put(
+        "controllability.floating_point_rank",
+        int(np.linalg.matrix_rank(floating)),
+        "",
+        "rounding decides it at this condition: shown because it is what one would compute",
+    )
     model = linear_model(vehicle)
     pbh = min(
         float(np.linalg.svd(np.hstack([p * np.eye(size) - model.A, model.B]), compute_uv=False)[-1])
@@ -249,24 +264,46 @@ def open_loop_modes(vehicle: Vehicle) -> list[tuple[str, complex, int]]:
 def _poles(context: Context) -> str:
     ledger, vehicle = context.ledger, load_vehicle("paper")
     poles = np.linalg.eigvals(linear_model(vehicle).A)
-    ledger.put("open_loop_poles", sorted_poles(poles))
-    rows = []
-    for name, key, (meaning, pole, count) in zip(
-        ("bounce", "pendulum", "drift"),
-        ("bounce", "pendulum", "drift"),
-        open_loop_modes(vehicle),
-        strict=True,
-    ):
-        # Twelve poles at zero in chains of up to four: rounding of 1e-16 moves them by its fourth root.
-        tolerance = 1e-3 if name == "drift" else 1e-6
+    modes = open_loop_modes(vehicle)
+    # Twelve poles at zero in chains of up to four: rounding of 1e-16 moves them by its fourth root.
+    drift = 1e-3
+    expected = [
+        p for _, pole, count in modes for p in [pole] * (count // 2) + [pole.conjugate()] * (count // 2)
+    ]
+    ledger.check_poles(
+        "open_loop_poles", sorted_poles(poles), expected, drift, "1/s", "theory: bounce, pendulum, drift"
+    )
+    rows: list[tuple[str | Cell, ...]] = []
+    for key, (meaning, pole, count) in zip(("bounce", "pendulum", "drift"), modes, strict=True):
         near = [p for p in poles if min(abs(p - pole), abs(p - pole.conjugate())) < 0.1]
         ledger.check(f"open_loop.{key}_poles", len(near), count, 0, "", "theory")
         apart = max(min(abs(p - pole), abs(p - pole.conjugate())) for p in near)
+        tolerance = drift if key == "drift" else 1e-6
         ledger.at_most(f"open_loop.{key}_distance_from_theory", apart, tolerance, "1/s", "theory")
-        rows.append((complex_text(pole), count, meaning, abs(pole) / (2 * math.pi), damping_ratio(pole)))
+        shape: tuple[str | Cell, str | Cell] = "0", ""
+        if abs(pole) > 0.0:
+            found = complex(near[0])
+            ledger.check(
+                f"open_loop.{key}_frequency_hz",
+                abs(found) / (2 * math.pi),
+                abs(pole) / (2 * math.pi),
+                1e-6,
+                "Hz",
+                "theory",
+            )
+            ledger.check(
+                f"open_loop.{key}_damping_ratio",
+                round(damping_ratio(found), 12),  # what is left of an undamped one is rounding
+                damping_ratio(pole),
+                1e-6,
+                "",
+                "theory",
+            )
+            shape = Cell(f"open_loop.{key}_frequency_hz"), Cell(f"open_loop.{key}_damping_ratio")
+        rows.append((complex_text(pole), Cell(f"open_loop.{key}_poles"), meaning, *shape))
     return (
         page.heading("Open-loop poles")
-        + page.table(("pole [1/s]", "how many", "meaning", "frequency [Hz]", "damping ratio"), rows)
+        + page.table(ledger, ("pole [1/s]", "how many", "meaning", "frequency [Hz]", "damping ratio"), rows)
         + page.text(
             "Nothing damps the pendulum: the thrust is fixed to the vehicle, and air drag is not in the "
             "model. The "
@@ -296,9 +333,20 @@ def _gains(context: Context) -> str:
         "K_integral.10": gains(far, True),
     }
     for key, (gain, model) in found.items():
-        ledger.put(key, gain)
+        weights = paper_lqr_weights() if key == "K_lqr" else paper_weights()
+        again = riccati.continuous(model, weights)
+        ledger.check_array(
+            key, gain, again.gain, 1e-6, "N and N m per unit of x", "eigenvectors of the Hamiltonian"
+        )
         closed[key] = np.linalg.eigvals(model.A - model.B @ gain)
-        ledger.put(f"closed_loop_poles.{key}", sorted_poles(closed[key]))
+        ledger.check_poles(
+            f"closed_loop_poles.{key}",
+            sorted_poles(closed[key]),
+            again.poles,
+            1e-6,
+            "1/s",
+            "stable eigenvalues of the Hamiltonian",
+        )
         ledger.at_most(f"gains.{key}.largest_real_part", float(closed[key].real.max()), -0.1, "1/s", "stable")
     fastest = float(closed["K_integral.1"].real.min())
     ledger.check("gains.fastest_pole_1_s", fastest, -1000.0, 1.0, "1/s", "errata.md")

@@ -98,7 +98,7 @@ def section(context: Context) -> str:
             "length. "
             "The cable pulls the vehicle by +F e and the load by -F e."
         )
-        + page.table(("eq.", "as printed", "as implemented", "where"), EQUATIONS)
+        + page.table(ledger, ("eq.", "as printed", "as implemented", "where"), EQUATIONS)
         + page.text(
             f"That these are corrections shows in numbers, at φ, θ, ψ = {ANGLES} rad. The printed eq. 2 is "
             "no rotation "

@@ -6,9 +6,9 @@ import base64
 import html
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from sitl.paper.record import CORRECTED, REPRODUCED, UNSUPPORTED, Ledger
+from sitl.paper.record import CORRECTED, NOT_JUDGED, REPRODUCED, UNSUPPORTED, WITHIN, Ledger
 
 STYLE = """
 :root { color-scheme: light; }
@@ -22,11 +22,20 @@ th { background: #f4f4f4; } td.n { text-align: right; font-variant-numeric: tabu
 code { font-size: 0.88em; background: #f4f4f4; padding: 0.1em 0.3em; overflow-wrap: anywhere; }
 pre { background: #f4f4f4; padding: 0.6rem; overflow-x: auto; font-size: 0.72rem; line-height: 1.35; }
 .good { color: #14632a; font-weight: 600; } .changed { color: #7a5200; font-weight: 600; }
-.bad { color: #a01818; font-weight: 600; } nav { columns: 2; }
+.bad { color: #a01818; font-weight: 600; } .plain { color: #555; } nav { columns: 2; }
 summary { cursor: pointer; }
 """
 
-_CLASS = {REPRODUCED: "good", CORRECTED: "changed", UNSUPPORTED: "bad", "within": "good"}
+_CLASS = {REPRODUCED: "good", CORRECTED: "changed", UNSUPPORTED: "bad", WITHIN: "good", NOT_JUDGED: "plain"}
+
+
+class Cell(NamedTuple):
+    """A number in a table: what the ledger has under a key, so that it stands in paper.json, too."""
+
+    key: str
+    """Dotted; a number in it leads into a list"""
+    scale: float = 1.0
+    """Shown is the value times this, e.g. 1000 for milliseconds"""
 
 
 def text(words: str) -> str:
@@ -51,10 +60,14 @@ def figure(png: bytes, caption: str, commands: Sequence[str] = ()) -> str:
     )
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A table; numbers are formatted and set to the right, text may hold markup."""
+def table(ledger: Ledger, head: Sequence[str], rows: Iterable[Sequence[str | Cell]]) -> str:
+    """A table of texts, which may hold markup, and of numbers, which only the ledger has."""
+    return _table(head, ("".join(_cell(ledger, cell) for cell in row) for row in rows))
+
+
+def _table(head: Sequence[str], rows: Iterable[str]) -> str:
     top = "".join(f"<th>{cell}</th>" for cell in head)
-    body = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
+    body = "".join(f"<tr>{row}</tr>" for row in rows)
     return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
@@ -79,36 +92,55 @@ def verdict(words: str) -> str:
     return f'<span class="{_CLASS.get(words, "bad")}">{html.escape(words)}</span>'
 
 
-def _cell(cell: Any) -> str:
-    if cell is None or isinstance(cell, (bool, int, float)):
-        return f'<td class="n">{number(cell)}</td>'
-    return f"<td>{cell}</td>"
+def _cell(ledger: Ledger, cell: str | Cell) -> str:
+    if isinstance(cell, str):
+        return f"<td>{cell}</td>"
+    value = ledger.value(cell.key)
+    shown = number(value if cell.scale == 1.0 or value is None else cell.scale * value)
+    return f'<td class="n" data-key="{cell.key}" data-scale="{cell.scale:g}">{shown}</td>'
 
 
 def verdict_table(ledger: Ledger) -> str:
     """Every claim of the paper with its verdict."""
     rows = [(v.where, v.paper, v.ours, verdict(v.verdict), v.why) for v in ledger.verdicts]
-    return table(("where", "the paper", "here", "verdict", "correction, or why"), rows)
+    return table(ledger, ("where", "the paper", "here", "verdict", "correction, or why"), rows)
 
 
 def check_table(ledger: Ledger) -> str:
-    """Every checked number with its expectation."""
+    """Every recorded number with its expectation, or why there is none."""
     rows = []
     for key, check in ledger.checks.items():
-        expected = f"{check['relation']} {number(check['expected'])}"
-        if check["relation"].startswith("±"):
-            expected = f"{number(check['expected'])} {check['relation']}"
-        rows.append(
-            (
-                f"<code>{key}</code>",
-                check["value"] if check["value"] is not None else "not finite",
-                check["unit"],
-                expected,
-                check["source"],
-                verdict(check["verdict"]),
-            )
-        )
-    return table(("key in paper.json", "value", "unit", "expected", "from", "verdict"), rows)
+        if isinstance(check["value"], (list, str)):
+            value: str | Cell = array_text(check["value"])
+        else:
+            value = Cell(key)
+        words = check["unit"], expectation(check), check["source"], verdict(check["verdict"])
+        rows.append((f"<code>{key}</code>", value, *words))
+    head = ("key in paper.json", "value", "unit", "expected", "from, or why none", "verdict")
+    return table(ledger, head, rows)
+
+
+def array_text(value: Any) -> str:
+    """What stands for an array in the table of all numbers: its size."""
+    if isinstance(value, str):
+        return html.escape(value)
+    size = [len(value)]
+    while isinstance(value[0], list):
+        value = value[0]
+        size.append(len(value))
+    return f"{' × '.join(map(str, size))} numbers"
+
+
+def expectation(check: dict[str, Any]) -> str:
+    """What was expected of a number, in words."""
+    if check["relation"] == "none":
+        return "–"
+    if isinstance(check["expected"], list):
+        return f"each entry {check['relation']} of those in paper.json"
+    expected = check["expected"] if isinstance(check["expected"], str) else number(check["expected"])
+    if check["relation"].startswith("±"):
+        return f"{expected} {check['relation']}"
+    return f"{check['relation']} {expected}"
 
 
 def document(title: str, lead: str, sections: Sequence[tuple[str, str]]) -> str:

@@ -82,9 +82,9 @@ def run(out: Path, quick: bool, stop: StopRequest) -> Outcome:
             sections = [(title, content(context)) for title, content in SECTIONS]
         finally:
             pilot.close()
-        ledger.put("run", {"quick": quick, "flights": pilot.flown, "duration_s": time.monotonic() - begun})
+        ledger.note("run", {"quick": quick, "flights": pilot.flown, "duration_s": time.monotonic() - begun})
     sections.insert(0, ("Verdicts", page.verdict_table(ledger)))
-    sections.append(("Every number that was checked", _checks(ledger)))
+    sections.append(("Every number", _checks(ledger)))
     text = page.document(
         "Load transportation with an elastic cable, reproduced and corrected", _lead(ledger), sections
     )
@@ -113,7 +113,8 @@ def _checks(ledger: Ledger) -> str:
     return page.text(
         "“errata.md” is the list of corrections to the paper that this project began with; other "
         "expectations come "
-        "from theory, from the paper's text, or from the second simulation."
+        "from theory, from the paper's text, from the second simulation, or from another way to compute the "
+        "same. Where there is none, a number is “not judged”, and the column says why."
     ) + page.check_table(ledger)
 
 
@@ -128,9 +129,9 @@ def _lead(ledger: Ledger) -> str:
         "control”, derives the equations of a quadrotor that carries a load on an elastic cable, and flies "
         "it with an "
         "LQR. This page runs every experiment of that paper again and says of each claim whether it "
-        f"holds: {tally}. Of {len(ledger.checks)} checked numbers "
-        f"{len(ledger.checks) - len(ledger.outside)} are "
-        "within tolerance. "
+        f"holds: {tally}. Of {len(ledger.checks)} recorded results "
+        f"{ledger.judged} have an expectation, and {ledger.judged - len(ledger.outside)} of these are within "
+        "tolerance. "
         f"Flights ({run['flights']}) are real ones: the simulated vehicle and its controller run as two "
         "processes that meet only over MAVLink, 250 times a second of simulated time. Every number here was "
         f"computed in this {'quick ' if run['quick'] else ''}run of {run['duration_s']:.0f} s and stands in "

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import pade
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
@@ -20,6 +21,7 @@ from sitl.metrics import settling_time
 from sitl.paper import offline, page, plots
 from sitl.paper.context import Context
 from sitl.paper.linear import gains
+from sitl.paper.page import Cell
 from sitl.paper.position import TARGET, vehicle_with
 from sitl.paper.record import CORRECTED, UNSUPPORTED
 from sitl_bridge.vehicle import Vehicle
@@ -116,6 +118,45 @@ def delay_margins(model: LinearModel, gain: Array) -> list[float]:
     return margins
 
 
+PADE_ORDER = 6
+
+
+def delayed_growth(model: LinearModel, gain: Array, late: int, delay: float) -> float:
+    """Largest real part, 1/s, of the loop with the input `late` delayed (s), by Padé's all-pass."""
+    series = [(-1.0) ** k / math.factorial(k) for k in range(2 * PADE_ORDER + 1)]
+    p, q = pade(series, PADE_ORDER)  # exp(-s), with s in units of 1/delay
+    through = float(p.coeffs[0] / q.coeffs[0])
+    rest = (p.coeffs - through * q.coeffs)[1:] / q.coeffs[0]
+    n, k = len(model.A), PADE_ORDER
+    # Controllable canonical form, driven by what the law asks of this input.
+    chain = np.diag(np.ones(k - 1), -1)
+    chain[0] = -q.coeffs[1:] / q.coeffs[0]
+    prompt = np.array([through if i == late else 1.0 for i in range(gain.shape[0])])
+    loop = np.zeros((n + k, n + k))
+    loop[:n, :n] = model.A - model.B @ (prompt[:, None] * gain)
+    loop[:n, n:] = np.outer(model.B[:, late], rest)
+    loop[n, :n] = -gain[late] / delay
+    loop[n:, n:] = chain / delay
+    return float(np.linalg.eigvals(loop).real.max())
+
+
+def delay_until_unstable(model: LinearModel, gain: Array, late: int) -> float:
+    """The delay margin (s) of an input a second time: no frequency response, but the poles with a Padé delay.
+
+    From 0.1 ms up until the loop grows, then bisected.
+    """
+    bad = 1e-4
+    while delayed_growth(model, gain, late, bad) < 0.0:
+        bad *= 1.1
+        if bad > 10.0:
+            return math.inf
+    good = bad / 1.1
+    while bad - good > 1e-6 * bad:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if delayed_growth(model, gain, late, middle) < 0.0 else (good, middle)
+    return good
+
+
 def section(context: Context) -> str:
     """The section's content."""
     ledger = context.ledger
@@ -139,27 +180,30 @@ def section(context: Context) -> str:
             ledger.at_most(key, radius, 1.0, "", "errata.md: stable above")
         rates[length] = (found[0], found[1])
         margins = delay_margins(model, gain)
-        for name, margin in zip(INPUTS, margins, strict=True):
-            ledger.put(f"sampling.delay_margin_s.{length}.{name}", margin)
+        for i, (name, margin) in enumerate(zip(INPUTS, margins, strict=True)):
+            again = delay_until_unstable(model, gain, i)
+            key = f"sampling.delay_margin_s.{length}.{name}"
+            ledger.check(key, margin, again, 1e-3 * again, "s", "poles with a Padé delay, bisected")
         ledger.check(
             f"sampling.smallest_delay_margin_s.{length}", min(margins), 1.5e-3, 1e-4, "s", "errata.md"
         )
-    rows = []
+    rows: list[tuple[str | Cell, ...]] = []
     for rate_hz, delay, expected, tolerance in (
         (250, 0, 3.1, 0.05),
         (500, 0, 1.02, 0.005),
         (1000, 1, 1.009, 5e-4),
     ):
-        both = []
+        both: list[Cell] = []
         for length, (_, gain, model) in designs.items():
             constant = SampledGain(gain, np.zeros((0, 4, 4)))
-            both.append(spectral_radius(model, constant, 1.0 / rate_hz, delay))
+            radius = spectral_radius(model, constant, 1.0 / rate_hz, delay)
             key = f"sampling.spectral_radius.{length}.{rate_hz}_hz_delay_{delay}"
             if length == "1":
-                ledger.check(key, both[-1], expected, tolerance, "", "errata.md")
+                ledger.check(key, radius, expected, tolerance, "", "errata.md")
             else:
-                ledger.at_least(key, both[-1], 1.0, "", "errata.md: unstable")
-        rows.append((rate_hz, delay, *both))
+                ledger.at_least(key, radius, 1.0, "", "errata.md: unstable")
+            both.append(Cell(key))
+        rows.append((str(rate_hz), str(delay), *both))
     vehicle, gain, model = designs[LENGTH]
     constant = SampledGain(gain, np.zeros((0, 4, 4)))
     sampled = _sampled(context, vehicle, model)
@@ -191,8 +235,8 @@ def section(context: Context) -> str:
         "zero-order hold and delay in the model, the cost discretised exactly",
         ["sampling.sampled_design"],
     )
-    margin_rows = [
-        (name, *(1e3 * ledger.numbers["sampling"]["delay_margin_s"][length][name] for length in designs))
+    margin_rows: list[tuple[str | Cell, ...]] = [
+        (name, *(Cell(f"sampling.delay_margin_s.{length}.{name}", 1e3) for length in designs))
         for name in INPUTS
     ]
     return (
@@ -203,7 +247,9 @@ def section(context: Context) -> str:
             "paper's integral "
             "gains, held (stable below 1):"
         )
-        + page.table(("rate [Hz]", "samples of delay", "spectral radius, l₀ = 1 m", "l₀ = 10 m"), rows)
+        + page.table(
+            ledger, ("rate [Hz]", "samples of delay", "spectral radius, l₀ = 1 m", "l₀ = 10 m"), rows
+        )
         + page.text(
             "The smallest stable rates, by bisection, and for the roll loop alone by its polynomial, are "
             f"{rates['1'][0]:.1f} Hz without delay and {rates['1'][1]:.0f} Hz with one sample for l₀ = 1 m, "
@@ -211,7 +257,7 @@ def section(context: Context) -> str:
             f"{STATED_RATES_HZ[1]:.0f} Hz: stable too, but not the smallest.)"
         )
         + page.text("Delay that each input bears on its own, the others without any:")
-        + page.table(("input", "l₀ = 1 m [ms]", "l₀ = 10 m [ms]"), margin_rows)
+        + page.table(ledger, ("input", "l₀ = 1 m [ms]", "l₀ = 10 m [ms]"), margin_rows)
         + page.figure(
             _draw(model, constant, zero, one),
             "<b>Spectral radius against sampling rate</b>, l₀ = 10 m. The paper's gains, held, and the "
@@ -226,7 +272,7 @@ def section(context: Context) -> str:
 
 def _sampled(context: Context, vehicle: Vehicle, model: LinearModel) -> str:
     """The sampled design keeps the paper's response at every rate and delay."""
-    ledger, rows = context.ledger, []
+    ledger, rows = context.ledger, list[tuple[str | Cell, ...]]()
     for rate_hz in (50.0, 100.0, 250.0, 500.0, 1000.0):
         for delay in (0, 2):
             told = vehicle_with(LENGTH, f"loop.delay_ticks={delay}")
@@ -237,7 +283,7 @@ def _sampled(context: Context, vehicle: Vehicle, model: LinearModel) -> str:
             ledger.at_most(f"{key}.spectral_radius", radius, 1.0 - 1e-6, "", "stable")
             continuous = max(p[0] for p in ledger.numbers["closed_loop_poles"]["K_integral"][LENGTH])
             ledger.check(f"{key}.slowest_pole_1_s", slowest, continuous, 0.02, "1/s", "slow poles stay")
-            time: float | None = None
+            settled: str | Cell = ""
             if rate_hz <= 250.0:
                 path = setpoint(TARGET, (0.0, 0.0, 0.0))
                 run = offline.closed_loop(told, design("paper", told, rate_hz), path, 15.0, rate_hz, delay)
@@ -246,8 +292,11 @@ def _sampled(context: Context, vehicle: Vehicle, model: LinearModel) -> str:
                 ledger.check(
                     f"{key}.settling_time_2pct_s", time or math.inf, 6.33, 0.15, "s", "continuous design"
                 )
-            rows.append((rate_hz, delay, radius, slowest, "" if time is None else time))
+                settled = Cell(f"{key}.settling_time_2pct_s")
+            poles = Cell(f"{key}.spectral_radius"), Cell(f"{key}.slowest_pole_1_s")
+            rows.append((f"{rate_hz:g}", str(delay), *poles, settled))
     return page.table(
+        ledger,
         (
             "rate [Hz]",
             "samples of delay",

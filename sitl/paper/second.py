@@ -217,6 +217,43 @@ def fly_with_noise(vehicle: Vehicle, law: Law, force_on_load: Array, period: flo
     return _run(np.asarray(np.arange(len(rows)) * period, dtype=float), np.array(rows), len(rows))
 
 
+def fly_sampled(vehicle: Vehicle, law: Law, period: float, ticks: int, steps: int) -> Run:
+    """Closed loop as a computer runs it: u from a sample, held for a period (s); v by the trapezoidal rule.
+
+    law.gain: of the sampled loop, without delay; steps: Runge-Kutta steps in each period. No rotor limits.
+    """
+    s = initial_state(vehicle)
+    h, integral, last = period / steps, np.zeros(3), np.zeros(3)
+    rows = [list(s)]
+    for k in range(ticks):
+        x = np.array(eq31(s))
+        error = x[3:6] - law.reference(k * period)
+        if k:
+            integral += 0.5 * period * (error + last)
+        last = error
+        thrust, roll, pitch, yaw = (
+            law.u_star - law.gain @ np.concatenate([x - law.x_star, integral])
+        ).tolist()
+        wrench = (thrust, roll, pitch, yaw)
+        for _ in range(steps):
+            s = _runge_kutta(vehicle, s, wrench, h)
+        rows.append(s)
+        if not max(map(abs, s[:3])) < FARTHEST or not abs(s[7]) < SINGULAR_PITCH:
+            break
+    return _run(np.asarray(np.arange(len(rows)) * period, dtype=float), np.array(rows), ticks + 1)
+
+
+def _runge_kutta(vehicle: Vehicle, s: list[float], wrench: Wrench, h: float) -> list[float]:
+    """The state (18,) in NED/FRD, h seconds later, by one classic step."""
+    k1 = derivative(vehicle, s, wrench)
+    k2 = derivative(vehicle, [a + 0.5 * h * b for a, b in zip(s, k1, strict=True)], wrench)
+    k3 = derivative(vehicle, [a + 0.5 * h * b for a, b in zip(s, k2, strict=True)], wrench)
+    k4 = derivative(vehicle, [a + h * b for a, b in zip(s, k3, strict=True)], wrench)
+    return [
+        a + h / 6.0 * (b + 2.0 * c + 2.0 * d + e) for a, b, c, d, e in zip(s, k1, k2, k3, k4, strict=True)
+    ]
+
+
 def _closed_loop(vehicle: Vehicle, law: Law, t: float, y: Array, on_load: Three) -> list[float]:
     """Derivative of the state and the integral, (21,)."""
     s = y.tolist()
