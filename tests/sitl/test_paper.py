@@ -228,6 +228,13 @@ def test_a_table_shows_what_the_ledger_has_and_nothing_else() -> None:
         page.table(ledger, ("",), [(1.5,)])  # type: ignore[list-item]
 
 
+def test_f2_is_a_transcription_of_its_own() -> None:
+    a, in_text = linear.linmod_matrix()
+    assert np.count_nonzero(in_text) == 323
+    assert not in_text[17, 17]
+    assert np.array_equal(a, linear.printed_matrices()[0])
+
+
 def test_two_ways_to_a_delay_margin() -> None:
     """A double integrator with u = -(x + 2 x'), whose margin one can work out."""
     model = sampling.LinearModel(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]))
