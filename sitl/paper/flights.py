@@ -37,6 +37,8 @@ class Flight(NamedTuple):
     """(n, 3) m"""
     load: Array
     """(n, 3) m"""
+    attitude: Array
+    """(n, 4) quaternion w, x, y, z, from body to world"""
     reference: Array
     """(n, 3) m"""
     tension: Array
@@ -142,6 +144,7 @@ class Pilot:
             time=log["time_s"],
             vehicle=positions(log, "vehicle"),
             load=positions(log, "load"),
+            attitude=np.stack([log[f"attitude_q{part}"] for part in "wxyz"], axis=1),
             reference=reference_positions(path, log["time_s"]),
             tension=log["cable_tension_N"],
             rotors=np.stack([log[f"rotor_{i + 1}_rad_s"] for i in range(len(vehicle.rotors))], axis=1),

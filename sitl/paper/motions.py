@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.signal import lsim, lti
 
 from sitl.paper import offline, page, plots, second
 from sitl.paper.context import Context
@@ -231,6 +233,25 @@ def oscillation(time: Array, signal: Array) -> tuple[float, float]:
     ]
     decrement = math.log(heights[0] / heights[-1]) / (len(heights) - 1)  # over half periods
     return float(frequency), decrement / math.hypot(math.pi, decrement)
+
+
+def driven_oscillation(time: Array, signal: Array, drive: Array) -> tuple[float, float]:
+    """Damped frequency (Hz) and damping ratio of y'' + 2ζω y' + ω² y = drive, y at rest to begin with.
+
+    time: equidistant, s; signal: y, and drive: in its unit per s², both (n,). Fitted to the whole signal, so
+    that what drives it is not taken for its own motion.
+    """
+    crossings = int(np.count_nonzero(np.diff(np.sign(signal))))
+    guess = math.pi * max(1, crossings) / float(time[-1] - time[0])
+
+    def response(parameters: Array) -> Array:
+        natural, ratio = parameters.tolist()
+        system = lti([1.0], [1.0, 2.0 * ratio * natural, natural**2])
+        return np.asarray(lsim(system, drive, time)[1] - signal)
+
+    found: list[float] = least_squares(response, [guess, 0.1], x_scale=[guess, 0.1]).x.tolist()
+    natural, ratio = found
+    return natural * math.sqrt(max(0.0, 1.0 - ratio**2)) / (2.0 * math.pi), ratio
 
 
 def _draw_heights(times: Array, ours: Array, other: Array) -> bytes:
