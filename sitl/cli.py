@@ -136,7 +136,7 @@ def _controller(arguments: argparse.Namespace) -> int:
 def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flight import FlightOptions, fly
     from sitl.hold import check_design, ground_arguments, hold
-    from sitl.report import table
+    from sitl.report import table, written
     from sitl.scenario import GroundControl, load_scenario
 
     if arguments.speed is not None and arguments.clock != "lockstep":
@@ -177,8 +177,8 @@ def _fly(arguments: argparse.Namespace) -> int:
         print(json.dumps(summary, indent=2))
     else:
         print(table(summary))
-        for name in sorted(out.iterdir()):
-            print(f"  {name}")
+        for file in written(out):
+            print(f"  {file}")
     if stop:
         return EXIT_INTERRUPTED
     return 0 if summary["settled"] else EXIT_FAILED

@@ -13,6 +13,7 @@ from typing import Any
 
 from controller.feedback import estimates
 from sitl.fly import Pair, ProgressLine, watch
+from sitl.report import clear, write_report
 from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
 from sitl_bridge.description import Override
 from sitl_bridge.mavlink.links import Address
@@ -107,6 +108,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
         options = replace(options, out=new_folder(Path("runs") / name))
     assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)
+    clear(options.out)
     assert not isinstance(scenario.reference, GroundControl)  # see `sitl.hold`
     path_from = scenario.reference.path
     line = ProgressLine(sys.stderr)
@@ -132,8 +134,6 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     line.end()
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
-    from sitl.report import write_report
-
     feedback = options.feedback or usual_feedback(scenario, vehicle)
     facts = {
         "scenario": options.scenario_name,

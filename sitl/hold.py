@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from sitl.flight import FlightOptions
 from sitl.fly import Pair, ProgressLine, watch
+from sitl.report import clear
 from sitl_bridge.description import DescriptionError
 from sitl_bridge.process import StopRequest
 
@@ -37,6 +38,8 @@ def check_design(design: str) -> None:
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     """Run both processes until asked to stop; returns what went wrong before that, if something did."""
     options.checked_vehicle()
+    if options.out is not None:
+        clear(options.out)
     line = ProgressLine(sys.stderr)
 
     def show(event: dict[str, Any]) -> None:

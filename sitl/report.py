@@ -14,13 +14,27 @@ from controller.estimate_log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.reference import Path as ReferencePath
 from sitl.metrics import SETTLED_WINDOW, flight_metrics, reference_positions
 from sitl.plain import plain
+from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.statelog import FILE_NAME
 from sitl_bridge.vehicle import Vehicle
 
 SUMMARY_NAME = "summary.json"
 PICTURE_NAME = "flight.png"
+FILES = (SUMMARY_NAME, FILE_NAME, TLOG_NAME, PICTURE_NAME, ESTIMATE_NAME, COVARIANCE_NAME)
+"""Names of everything that a flight leaves in its folder."""
 
 Log = dict[str, NDArray[np.float64]]
+
+
+def clear(out: Path) -> None:
+    """Remove what an earlier flight has left in the folder, so that nothing of it is taken for this one's."""
+    for name in FILES:
+        (out / name).unlink(missing_ok=True)
+
+
+def written(out: Path) -> list[Path]:
+    """What a flight has left in its folder, which was cleared before it."""
+    return [file for name in sorted(FILES) if (file := out / name).exists()]
 
 
 def read_state_log(path: Path) -> Log:

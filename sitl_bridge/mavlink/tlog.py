@@ -20,6 +20,7 @@ from sitl_bridge.mavlink.framing import (
     scan,
 )
 
+FILE_NAME = "link.tlog"
 TIMESTAMP_SIZE = 8
 _OUT_SIZE = LARGEST_DATAGRAM + TIMESTAMP_SIZE * MOST_FRAMES
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
+from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import TlogWriter
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.plant.faulty_link import FaultyLink
@@ -24,7 +25,6 @@ from sitl_bridge.plant.statelog import FILE_NAME, StateLog
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle import Vehicle
 
-TLOG_NAME = "link.tlog"
 REPORT_INTERVAL = 0.2
 """Between two progress events, s."""
 
@@ -96,14 +96,14 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str,
         on_begin=progress.begin,
         faults=options.faults,
     )
+    punctual = options.clock == "realtime" or bool(options.faults.link)
+    link = open_link(options.hil, speaker.say, punctual)
     log, tlog = None, None
-    if options.out is not None:
+    if options.out is not None:  # behind the link: a port in use leaves no empty logs
         options.out.mkdir(parents=True, exist_ok=True)
         log = StateLog(options.out / FILE_NAME, simulation.world)
         simulation.record_with(log)
         tlog = TlogWriter(options.out / TLOG_NAME)
-    punctual = options.clock == "realtime" or bool(options.faults.link)
-    link = open_link(options.hil, speaker.say, punctual)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
     if options.faults.link:

@@ -117,6 +117,29 @@ def test_a_killed_process_ends_the_flight_with_a_word(
     assert not any(map(alive, pids))
 
 
+def test_a_folder_used_again_tells_nothing_of_the_flight_before(
+    start: Start, port: int, tmp_path: Path
+) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text("mine")
+    line = ("fly", "hover", "--out", str(tmp_path), "--clock", "lockstep", "--duration", "6")
+    code, output, errors = start(*line, "--hil", f"udpout:127.0.0.1:{port}").finish()
+    assert code == 0, errors
+    listed = {Path(word).name for word in output.split() if word.startswith(str(tmp_path))}
+    assert listed == {file.name for file in tmp_path.iterdir()} - {"notes.txt"}
+    assert "state.parquet" in listed
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+        holder.bind(("127.0.0.1", port))
+        code, output, errors = start(*line, "--hil", f"udpin:127.0.0.1:{port}").finish()
+    assert code == 1
+    assert "cannot be opened: Address already in use" in errors
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert not summary["settled"]
+    assert summary.get("steady_state_error_m") is None
+    assert output.split()[-1] == str(tmp_path / "summary.json")
+    assert {file.name for file in tmp_path.iterdir()} == {"notes.txt", "summary.json"}
+
+
 def test_a_killed_supervisor_leaves_nothing_running(start: Start, port: int, tmp_path: Path) -> None:
     flight = start("fly", "hover", "--hil", f"udpout:127.0.0.1:{port}", "--out", str(tmp_path))
     flight.wait_for("the scenario begins")
