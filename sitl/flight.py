@@ -13,7 +13,7 @@ from typing import Any
 
 from controller.feedback import estimates
 from sitl.fly import Pair, ProgressLine, watch
-from sitl.report import clear, write_report
+from sitl.report import OF_THE_PLANT, clear, write_report
 from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
 from sitl_bridge.description import Override
 from sitl_bridge.mavlink.links import Address
@@ -147,7 +147,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
         "failure": outcome.failure,
         "launch_to_first_command_s": outcome.launch_to_first_command_s,
         "first_command_unix_s": outcome.first_command_unix_s,
-        **{key: value for key, value in outcome.end.items() if key not in ("completed", "stopped_by")},
+        **{key: outcome.end[key] for key in OF_THE_PLANT if key in outcome.end},
     }
     path = path_from(start)
     estimating = vehicle if estimates(feedback, vehicle) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +59,20 @@ def steady(times: Array) -> NDArray[np.bool_]:
     return np.asarray(times >= (STEADY_FROM if end > STEADY_FROM else end * 2.0 / 3.0))
 
 
-def flight_metrics(times: Array, load: Array, reference: Array) -> dict[str, Any]:
+class Metrics(TypedDict):
+    """What a flight came to; None where a figure does not exist."""
+
+    settled: bool
+    settled_tolerance_m: float
+    largest_error_at_end_m: float
+    settling_time_2pct_s: float | None
+    settling_time_1cm_s: float | None
+    overshoot_pct: float | None
+    steady_state_error_m: float
+    tracking_rms_m: float
+
+
+def flight_metrics(times: Array, load: Array, reference: Array) -> Metrics:
     """Metrics of a flight: times (n,) in s, load (n, 3) and reference (n, 3) in m, world.
 
     A step is a reference that stands still away from where the load begins.

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from controller.estimate_log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.reference import Path as ReferencePath
-from sitl.metrics import SETTLED_WINDOW, flight_metrics, reference_positions
+from sitl.metrics import SETTLED_WINDOW, Metrics, flight_metrics, reference_positions
 from sitl.plain import plain
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
+from sitl_bridge.plant.account import Account
 from sitl_bridge.plant.statelog import FILE_NAME
 from sitl_bridge.vehicle import Vehicle
 
@@ -22,6 +23,10 @@ SUMMARY_NAME = "summary.json"
 PICTURE_NAME = "flight.png"
 FILES = (SUMMARY_NAME, FILE_NAME, TLOG_NAME, PICTURE_NAME, ESTIMATE_NAME, COVARIANCE_NAME)
 """Names of everything that a flight leaves in its folder."""
+OF_THE_PLANT = tuple(key for key in Account.__annotations__ if key not in ("completed", "stopped_by"))
+"""Keys of the plant's account that go into the summary as they are; the other two `sitl fly` knows better."""
+PROMISED = (*OF_THE_PLANT, *Metrics.__annotations__, "estimate", "picture", "state_log_sha256")
+"""Keys of every summary, however the flight ended: null for what is not known."""
 
 Log = dict[str, NDArray[np.float64]]
 
@@ -63,7 +68,7 @@ def write_report(
     controller was told, where it has left a log of its estimate.
     """
     state_log = out / FILE_NAME
-    summary = {**facts, "settled": False}
+    summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
     if path is not None and state_log.exists():
         try:
             log = read_state_log(state_log)

@@ -75,8 +75,8 @@ def _figure_10(context: Context) -> str:
         vehicle, name = flight.vehicle_description, f"figures.10.{length}"
         other = second.fly(vehicle, law(vehicle, lambda _: TARGET), flight.time)
         others.append(other)
-        metrics = flight_metrics(flight.time, flight.load, flight.reference)
-        theirs = flight_metrics(other.time, other.load, flight.reference)
+        metrics: dict[str, Any] = {**flight_metrics(flight.time, flight.load, flight.reference)}
+        theirs: dict[str, Any] = {**flight_metrics(other.time, other.load, flight.reference)}
         for key, (expected, tolerance) in EXPECTED[length].items():
             unit = "s" if key.endswith("_s") else "%"
             source = "errata.md" if length == "10" else "continuous design"

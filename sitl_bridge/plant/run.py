@@ -6,12 +6,13 @@ import gc
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.loss import LossyLink
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.plant.account import Account
 from sitl_bridge.plant.faults import Faults
 from sitl_bridge.plant.faulty_link import FaultyLink
 from sitl_bridge.plant.lateness import Lateness
@@ -81,7 +82,7 @@ class Progress:
         return simulation.scenario_time / max(1e-9, time.monotonic() - self.began_at)
 
 
-def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
+def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
     """Run a plant until its scenario is over or it is asked to stop; returns what to report of it.
 
     Raises OSError when the link cannot be opened or a log not written.
@@ -194,7 +195,7 @@ def _loop(
 
 def _outcome(
     options: PlantOptions, clock: Lockstep | Realtime, progress: Progress, stop: StopRequest
-) -> dict[str, Any]:
+) -> Account:
     lateness = clock.lateness if isinstance(clock, Realtime) else Lateness()
     late_s = {"p50": lateness.percentile(50), "p99": lateness.percentile(99)}
     late_s["max"] = lateness.largest if lateness.ticks else None

@@ -18,6 +18,16 @@ Start = Callable[..., Process]
 WAITS_FOR_CONTROLLER = "waiting for an autopilot on udpout:127.0.0.1:"
 WAITS_FOR_PLANT = "waiting for a plant on udpin:127.0.0.1:"
 
+KEYS = {
+    *("scenario", "vehicle", "design", "feedback", "seed", "clock", "rate_hz", "completed", "failure"),
+    *("launch_to_first_command_s", "first_command_unix_s", "time_s", "real_time_factor", "lateness_us"),
+    *("late_ticks", "resent_ticks", "unanswered_ticks", "settled", "settled_tolerance_m"),
+    *("largest_error_at_end_m", "settling_time_2pct_s", "settling_time_1cm_s", "overshoot_pct"),
+    *("steady_state_error_m", "tracking_rms_m", "estimate", "picture", "state_log", "state_log_sha256"),
+    "tlog",
+}
+"""Of every summary, however the flight ended."""
+
 
 def plant_arguments(port: int, *more: str) -> list[str]:
     return ["plant", "--scenario", "setpoint", "--hil", f"udpout:127.0.0.1:{port}", *more]
@@ -115,6 +125,10 @@ def test_a_killed_process_ends_the_flight_with_a_word(
     assert f"the {victim} was killed by SIGKILL" in errors
     assert "Traceback" not in errors
     assert not any(map(alive, pids))
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert set(summary) >= KEYS
+    if victim == "plant":
+        assert summary["real_time_factor"] is summary["lateness_us"] is summary["late_ticks"] is None
 
 
 def test_a_folder_used_again_tells_nothing_of_the_flight_before(
