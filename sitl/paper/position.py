@@ -116,10 +116,8 @@ def _figure_10(context: Context) -> str:
         continuous = (Cell(f"{name}.continuous_design.{key}") for key in keys)
         rows.append((f"continuous gains, second simulation, l₀ = {length} m", *continuous, ""))
     for ours in flights[len(LENGTHS) :]:
-        metrics, name = (
-            flight_metrics(ours.time, ours.load, ours.reference),
-            "figures.10.default_design_on_10",
-        )
+        name = "figures.10.default_design_on_10"
+        metrics = {**flight_metrics(ours.time, ours.load, ours.reference)}
         for key in (*keys, "tracking_rms_m"):
             ledger.put(f"{name}.{key}", metrics[key], "", "our own design: the paper has nothing like it")
         label = f"our default design, l₀ = 10 m: <code>{ours.command}</code>"

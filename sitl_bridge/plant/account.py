@@ -10,6 +10,8 @@ class Account(TypedDict):
 
     completed: bool
     """Whether the scenario came to its end."""
+    failure: str | None
+    """Why it cannot go on; None: nothing of the kind."""
     stopped_by: str | None
     time_s: float
     """Since the scenario began."""

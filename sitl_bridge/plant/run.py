@@ -131,6 +131,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         failure = str(error)
         speaker.say(f"{failure}: it ends here; what the description asks for cannot be simulated")
     finally:
+        factor = progress.factor(simulation)  # now: the logs take their time to close
         link.close()
         if station is not None:
             station.close()
@@ -140,7 +141,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
             log.close()
     if stop:
         speaker.say(f"stopped by {stop.reason} at t = {simulation.scenario_time:.2f} s")
-    outcome = {**_outcome(options, clock, progress, stop), "failure": failure}
+    outcome = _outcome(options, clock, factor, stop, failure)
     speaker.event("end", **outcome)
     return outcome
 
@@ -194,16 +195,21 @@ def _loop(
 
 
 def _outcome(
-    options: PlantOptions, clock: Lockstep | Realtime, progress: Progress, stop: StopRequest
+    options: PlantOptions,
+    clock: Lockstep | Realtime,
+    factor: float | None,
+    stop: StopRequest,
+    failure: str | None,
 ) -> Account:
     lateness = clock.lateness if isinstance(clock, Realtime) else Lateness()
     late_s = {"p50": lateness.percentile(50), "p99": lateness.percentile(99)}
     late_s["max"] = lateness.largest if lateness.ticks else None
     return {
         "completed": clock.finished,
+        "failure": failure,
         "stopped_by": stop.reason,
         "time_s": clock.simulation.scenario_time,
-        "real_time_factor": progress.factor(clock.simulation),
+        "real_time_factor": factor,
         "lateness_us": {key: None if late is None else late * 1e6 for key, late in late_s.items()},
         "late_ticks": clock.late_ticks if isinstance(clock, Realtime) else 0,
         "resent_ticks": clock.resent_ticks if isinstance(clock, Lockstep) else 0,
