@@ -45,16 +45,20 @@ def link_address(text: str) -> str:
     from sitl_bridge.mavlink.links import parse_address
 
     try:
-        parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
+        address = parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
+    if address.port == 0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a port that the other end can know, 1 to 65535")
     return text
 
 
 def host_and_port(text: str) -> tuple[str, int]:
     """An argument type: HOST:PORT."""
+    from sitl_bridge.mavlink.links import possible_host
+
     host, _, port = text.rpartition(":")
-    if not host or not port.isdigit() or not 0 < int(port) <= 65535:
+    if not possible_host(host) or not port.isdecimal() or not 0 < int(port) <= 65535:
         raise argparse.ArgumentTypeError(f"{text!r}: expected HOST:PORT, as in 127.0.0.1:{STATION_PEER}")
     return host, int(port)
 
@@ -64,7 +68,7 @@ def ports(text: str) -> Ports:
     from controller.ground_link import Ports
 
     local, colon, peer = text.partition(":")
-    numbers = [int(part) for part in (local, peer) if part.isdigit() and 0 < int(part) < 65536]
+    numbers = [int(part) for part in (local, peer) if part.isdecimal() and 0 < int(part) < 65536]
     if not colon or len(numbers) != 2:
         example = f"{STATION_LOCAL}:{STATION_PEER}"
         raise argparse.ArgumentTypeError(f"{text!r}: expected two UDP ports LOCAL:PEER, as in {example}")

@@ -35,6 +35,14 @@ class Address(NamedTuple):
         return f"{self.kind}:{self.host}:{self.port}"
 
 
+def possible_host(text: str) -> bool:
+    """Whether this may be a host's name or address; what has an empty label is neither, and no lookup."""
+    try:
+        return bool(text.encode("idna"))
+    except UnicodeError:
+        return False
+
+
 def parse_address(text: str, udp_port: int | None = None, tcp_port: int | None = None) -> Address:
     """Parse `udpout:HOST:PORT | udpin:… | tcpin:… | tcpout:…`; raises ValueError with what was expected.
 
@@ -45,7 +53,7 @@ def parse_address(text: str, udp_port: int | None = None, tcp_port: int | None =
     default = tcp_port if kind.startswith("tcp") else udp_port
     if ":" not in rest and default is not None:
         host, port = rest or "127.0.0.1", str(default)
-    if kind not in KINDS or not host or not port.isdigit() or not 0 <= int(port) <= 65535:
+    if kind not in KINDS or not possible_host(host) or not port.isdecimal() or not 0 <= int(port) <= 65535:
         raise ValueError(f"{text!r}: expected {'|'.join(KINDS)}:HOST:PORT, as in udpout:127.0.0.1:14560")
     return Address(kind, host, int(port))  # type: ignore[arg-type]  # just checked against KINDS
 

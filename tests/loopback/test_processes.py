@@ -194,6 +194,16 @@ def test_a_port_in_use_is_one_clear_line(start: Start, port: int) -> None:
             ["plant", "--hil", "udp:1"],
             "argument --hil: 'udp:1': expected udpout|udpin|tcpin|tcpout:HOST:PORT",
         ),
+        (
+            ["plant", "--hil", "udpout:127..0.0.1:14560"],
+            "argument --hil: 'udpout:127..0.0.1:14560': expected udpout|udpin|tcpin|tcpout:HOST:PORT",
+        ),
+        (["fly", "hover", "--hil", "udpin:127.0.0.1:0"], "expected a port that the other end can know, 1 to"),
+        (["controller", "--hil", "tcpout:127.0.0.1:0"], "expected a port that the other end can know, 1 to"),
+        (
+            ["plant", "--load-to", "127..0.0.1:14550"],
+            "argument --load-to: '127..0.0.1:14550': expected HOST:",
+        ),
         (["plant", "--speed", "2"], "--speed: goes with --clock lockstep"),
         (["fly", "hover", "--instance", "100"], "expected an instance, 0 to 99"),
     ],
