@@ -106,23 +106,16 @@ class Station:
 
     def receive(self, datagram: bytes, address: Address, now: float) -> None:
         """A datagram from a peer. Never raises, whatever is in it."""
+        for frame in split(datagram[:0xFFFF]).frames:
+            self.receive_frame(frame, address, now)
+
+    def receive_frame(self, frame: Frame, address: Address, now: float) -> None:
+        """One frame of a peer's datagram."""
         self._stirred = True
         self._due = now
-        for frame in split(datagram[:0xFFFF]).frames:
-            if self._takes(frame, now):
-                self._receive_frame(frame, address, now)
-            else:
-                self.dropped += 1
-
-    def _takes(self, frame: Frame, now: float) -> bool:
-        if frame.version == 2 and frame.raw[2] & ~FLAG_SIGNED:
-            return False  # an incompatibility flag that we do not know: the standard says to drop it
-        source = (frame.system, frame.component)
-        if frame.system == _BROADCAST or source in (self._out.vehicle, self._out.load):
-            return False  # nobody, or ourselves; a companion computer may share the vehicle's system
-        return self._signing is None or self._signing.accepts(frame, now)
-
-    def _receive_frame(self, frame: Frame, address: Address, now: float) -> None:
+        if not self._takes(frame, now):
+            self.dropped += 1
+            return
         peer = self.peers.find(address, now)
         if peer is None:
             self.dropped += 1
@@ -133,6 +126,14 @@ class Station:
             self.dropped += 1
             return
         self._inbox.take(message, frame, peer, now)
+
+    def _takes(self, frame: Frame, now: float) -> bool:
+        if frame.version == 2 and frame.raw[2] & ~FLAG_SIGNED:
+            return False  # an incompatibility flag that we do not know: the standard says to drop it
+        source = (frame.system, frame.component)
+        if frame.system == _BROADCAST or source in (self._out.vehicle, self._out.load):
+            return False  # nobody, or ourselves; a companion computer may share the vehicle's system
+        return self._signing is None or self._signing.accepts(frame, now)
 
     def hear_plant(self, frame: Frame, now: float) -> None:
         """What the plant says: the load's own messages, and answers to what was passed on to it."""

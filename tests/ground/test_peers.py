@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import socket
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v10 import common as v1
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.peers import MOST_PEERS, SILENCE
-from controller.ground.sockets import BindError, GroundSockets
+from controller.ground.sockets import FRAMES_AT_ONCE, MOST_BYTES, BindError, GroundSockets
 from controller.ground.streams import DEFAULT_RATES
 from sitl_bridge.mavlink.framing import Packer, split
 from tests.ground.rig import Rig
@@ -207,3 +209,30 @@ def test_links_stay_on_this_machine_unless_told_otherwise() -> None:
     assert [link.getsockname()[0] for link in links.sockets] == ["127.0.0.1"] * 2
     links.close()
     GroundSockets((0, 0), "0.0.0.0", exposed=True).close()
+
+
+def test_one_exchange_takes_so_many_frames_and_leaves_the_rest_to_the_next() -> None:
+    """A full datagram of requests would otherwise stand in front of the control loop for 80 ms."""
+    rig = Rig()
+    links = GroundSockets((0, 0))
+    taken: list[int] = []
+    original = rig.station.receive_frame
+
+    def counted(*arguments: Any) -> None:
+        taken[-1] += 1
+        original(*arguments)
+
+    rig.station.receive_frame = counted  # type: ignore[method-assign]
+    packer = Packer(255, 190)
+    request = mavlink.MAVLink_param_request_read_message(1, 1, b"", 0)
+    frames = [packer.pack(request) for _ in range(65507 // len(packer.pack(request)))]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.sendto(b"".join(frames), links.sockets[0].getsockname())
+        client.sendto(frames[0], links.sockets[1].getsockname())
+        for _ in range(len(frames)):
+            taken.append(0)
+            links.exchange(rig.station, rig.now)
+    links.close()
+    assert max(taken) <= FRAMES_AT_ONCE + 1  # of one link, and the other's one
+    assert taken[0] == FRAMES_AT_ONCE + 1
+    assert sum(taken) == MOST_BYTES // len(frames[0]) + 1
