@@ -14,7 +14,7 @@ from controller.ground.missions import Client, Missions
 from controller.ground.modes import Machine
 from controller.ground.outbox import Outbox
 from controller.ground.parameters import Parameters
-from controller.ground.peers import Peer
+from controller.ground.peers import Peer, Peers
 from controller.ground.setpoints import setpoint_of
 from controller.ground.verdict import WARNING, Notice
 from controller.ground.wire import Packed
@@ -40,6 +40,7 @@ class Inbox:
         missions: Missions,
         commands: CommandService,
         out: Outbox,
+        peers: Peers,
     ) -> None:
         self._profile = machine.profile
         self._machine = machine
@@ -47,12 +48,13 @@ class Inbox:
         self._missions = missions
         self._commands = commands
         self._out = out
+        self._peers = peers
 
     def take(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         """A message from a peer; what is for nobody here is left."""
         number = frame.message_id  # not message.id: some messages have a field of that name
         if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:
-            peer.last_station_heartbeat = now
+            self._peers.last_station = now
         handler = _HANDLERS.get(number)
         if handler is not None:
             handler(self, message, frame, peer, now)

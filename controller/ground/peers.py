@@ -41,8 +41,6 @@ class Peer:
         self.last_heard = now
         self.version = 0
         """Largest MAVLink version heard; 0 until then, which is answered in version 2."""
-        self.last_station_heartbeat: float | None = None
-        """When a ground station (MAV_TYPE_GCS) was last heard here."""
         self.streams = Streams(now)
         self.queue: deque[bytes] = deque(maxlen=LONGEST_QUEUE)
         self.sequences: dict[tuple[int, int], int] = {}
@@ -81,6 +79,8 @@ class Peers:
 
     def __init__(self, standard: tuple[Address, ...], now: float) -> None:
         self._table = {address: Peer(address, True, now) for address in standard}
+        self.last_station: float | None = None
+        """When any ground station was last heard by its heartbeat, be its peer forgotten or not."""
 
     def __iter__(self) -> Iterator[Peer]:
         return iter(self._table.values())
@@ -101,9 +101,3 @@ class Peers:
             else:
                 del self._table[peer.address]
         return [peer.address for peer in silent]
-
-    @property
-    def last_station(self) -> float | None:
-        """When any ground station was last heard by its heartbeat."""
-        times = [peer.last_station_heartbeat for peer in self if peer.last_station_heartbeat is not None]
-        return max(times, default=None)

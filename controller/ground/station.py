@@ -93,7 +93,9 @@ class Station:
         )
         self._commands = CommandService(self.machine, self._out, stored, self._built, self._show_state)
         self.plant_commands = self._commands.plant
-        self._inbox = Inbox(self.machine, self.parameters, self.missions, self._commands, self._out)
+        self._inbox = Inbox(
+            self.machine, self.parameters, self.missions, self._commands, self._out, self.peers
+        )
         self._housekeeping = now
         self._due = now
         """When something is to be sent next"""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.peers import SILENCE
 from controller.ground.targets import Terminate
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.in_flight import ACCEPTED, flying, local_setpoint, mode, set_parameter, stream
@@ -26,22 +27,39 @@ def test_offboard_lost(action: int, expected: str) -> None:
     assert any("No offboard set-point" in text for text in client.texts())
 
 
+@pytest.mark.parametrize("timeout", [10.0, 40.0])
 @pytest.mark.parametrize(
     ("action", "expected"), [(0, "HOLD"), (1, "HOLD"), (2, "RTL"), (3, "LAND"), (5, "TERMINATION")]
 )
-def test_ground_station_lost(action: int, expected: str) -> None:
+def test_ground_station_lost(action: int, expected: str, timeout: float) -> None:
+    """Also when the time-out is longer than a silent peer is remembered."""
     rig = Rig()
     client = rig.client()
     client.heartbeat()
     rig.fly(client)
     set_parameter(rig, client, "NAV_DLL_ACT", action)
+    set_parameter(rig, client, "COM_DL_LOSS_T", timeout)
     for _ in range(20):
         client.heartbeat()
         rig.run(1.0)
+    rig.run(timeout - 1.5)
     assert mode(rig) == "HOLD"
-    rig.run(10.5)
+    rig.run(1.0)
     assert mode(rig) == expected
     assert any("No ground station" in text for text in client.texts()) == (action != 0)
+
+
+def test_a_lost_ground_station_stays_lost_until_one_is_heard() -> None:
+    rig = Rig()
+    client = rig.client()
+    client.heartbeat()
+    rig.fly(client)
+    set_parameter(rig, client, "NAV_DLL_ACT", 1)
+    rig.run(SILENCE + 10.0)
+    assert "station" in rig.station.machine.failsafes.active
+    client.heartbeat()
+    rig.run(0.5)
+    assert "station" not in rig.station.machine.failsafes.active
 
 
 def test_one_of_two_ground_stations_is_enough_and_none_ever_is_no_loss() -> None:
