@@ -143,6 +143,12 @@ class Guidance:
         self._yaw = self._yaw if math.isnan(yaw) else yaw
         self.speed = speed
 
+    def break_off_landing(self) -> None:
+        """Fly on, if the load still hangs; one that lies is picked up by a take-off."""
+        if self.stage is Stage.DESCENT and not self.load_is_down:
+            self.stage = Stage.FLYING
+            self._descent = None
+
     def start(self, mode: Mode) -> None:
         """Begin a mode in flight, from where the vehicle holds."""
         self.speed = math.nan
@@ -212,12 +218,7 @@ class Guidance:
         return view.position[2] >= fence.home[2] + fence.least_height
 
     def _descend(self, descent: Descent, view: VehicleView, last: Target) -> Target:
-        if self._pilot.mode not in (Mode.LAND, Mode.RTL):
-            if descent.hangs:
-                self.stage = Stage.FLYING
-                self.hold_here(view)
-                self.start(self._pilot.mode)
-                return self._hold(view)
+        if self._pilot.mode not in (Mode.LAND, Mode.RTL):  # with the load down: `break_off_landing`
             self.take_off(view)
             return last
         target = descent.target(view)

@@ -308,6 +308,8 @@ class Machine:
             self.mission.pause()
         again = mode is self.mode and mode not in (Mode.HOLD, Mode.RTL)
         self.set_mode_to(mode)
+        if mode not in (Mode.LAND, Mode.RTL):
+            self._guidance.break_off_landing()
         if self.view is not None and self.armed and self.stage is Stage.FLYING and not again:
             self._guidance.hold_here(self.view)
             self._guidance.start(mode)

@@ -7,6 +7,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.guidance import Stage
 from controller.ground.targets import Body, Goto
 from tests.ground.in_flight import ACCEPTED, DENIED, HOME_HEIGHT, flying, mode
 from tests.ground.kinematic import PROFILE, ZURICH
@@ -97,6 +98,18 @@ def test_return_climbs_and_brings_the_load_home() -> None:
         highest = max(highest, rig.view.position[2])
     assert highest == pytest.approx(6.0 + HOME_HEIGHT, abs=0.6)
     assert math.dist(rig.view.load_position[:2], start) < 0.5
+
+
+@pytest.mark.parametrize("number", [21, 20])
+def test_a_landing_is_broken_off_by_a_point_to_go_to(number: int) -> None:
+    rig, client = flying()
+    client.command(number)
+    rig.run_until(lambda: rig.station.machine.stage is Stage.DESCENT)
+    rig.run(0.5)
+    assert client.command(192, -1, 1, 0, NAN, ZURICH[0] + 1e-4, ZURICH[1], 488.0 + 4.0).result == ACCEPTED
+    rig.run(15.0)
+    assert rig.view.position == pytest.approx((0.0, 11.12, 4.0), abs=0.05)
+    assert mode(rig) == "HOLD"
 
 
 def test_a_landing_is_broken_off_by_hold() -> None:
