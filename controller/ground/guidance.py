@@ -219,6 +219,7 @@ class Guidance:
 
     def _descend(self, descent: Descent, view: VehicleView, last: Target) -> Target:
         if self._pilot.mode not in (Mode.LAND, Mode.RTL):  # with the load down: `break_off_landing`
+            self._pilot.say(INFO, "Landing broken off: taking off again")
             self.take_off(view)
             return last
         target = descent.target(view)

@@ -156,7 +156,7 @@ class Machine:
         """Take off, now or when armed, to a height of the vehicle, m ENU; NaN: by MIS_TAKEOFF_ALT."""
         if self.terminated:
             return deny("Take-off refused: the flight was terminated; disarm first")
-        if self.flying and self.stage is not Stage.ASCENT:
+        if self.flying and self.stage is not Stage.ASCENT and not self._guidance.load_is_down:
             return not_now("Take-off refused: already flying; send a point to go to instead")
         fence = self.fence
         if fence is None or self.view is None:

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.guidance import Stage
 from controller.ground.targets import Body, Goto
-from tests.ground.in_flight import ACCEPTED, DENIED, HOME_HEIGHT, flying, mode
+from tests.ground.in_flight import ACCEPTED, DENIED, HOME_HEIGHT, REJECTED, flying, mode
 from tests.ground.kinematic import PROFILE, ZURICH
 from tests.ground.rig import NAN, Rig
 
@@ -110,6 +110,23 @@ def test_a_landing_is_broken_off_by_a_point_to_go_to(number: int) -> None:
     rig.run(15.0)
     assert rig.view.position == pytest.approx((0.0, 11.12, 4.0), abs=0.05)
     assert mode(rig) == "HOLD"
+
+
+def test_a_landing_with_the_load_down_is_broken_off_by_a_take_off() -> None:
+    rig, client = flying()
+    client.command(21)
+    rig.run_until(lambda: rig.view.load_on_ground)
+    rig.run(0.1)
+    there = (-1, 1, 0, NAN, ZURICH[0] + 1e-4, ZURICH[1], 488.0 + 4.0)
+    assert client.command(192, *there).result == REJECTED
+    assert "take off again" in client.texts()[-1]
+    assert client.command(22, *(NAN,) * 6, 488.0 + HOME_HEIGHT + 4.0).result == ACCEPTED
+    rig.run_until(lambda: mode(rig) == "HOLD")
+    assert "Landing broken off: taking off again" in client.texts()
+    rig.run(3.0)
+    assert rig.view.position[2] == pytest.approx(4.0 + HOME_HEIGHT, abs=0.25)
+    assert not rig.view.load_on_ground
+    assert client.command(192, *there).result == ACCEPTED
 
 
 def test_a_landing_is_broken_off_by_hold() -> None:
