@@ -25,6 +25,7 @@ from controller.ground.points import (
     limited_speed,
     limited_velocity,
     stopping_point,
+    too_deep,
 )
 from controller.ground.px4_modes import Mode
 from controller.ground.return_home import ReturnHome
@@ -86,6 +87,8 @@ class Guidance:
         """m, of `_point_of` in HOLD and while waiting"""
         self._point_of = Body.LOAD
         self._yaw = 0.0
+        self._at_floor = False
+        """The offboard client asks for less height than there may be, and has been told"""
 
     # Where it begins
 
@@ -132,7 +135,9 @@ class Guidance:
 
     def hold_here(self, view: VehicleView) -> None:
         """Come to rest, and stay."""
-        self._stay_at(stopping_point(view, self._parameters), controlled_body(view))
+        x, y, z = stopping_point(view, self._parameters)
+        least = min(self._floor(view), self._height(view))
+        self._stay_at((x, y, max(z, least)), controlled_body(view))
         self._yaw = euler_from_quaternion(view.attitude)[2]
         self.speed = math.nan
 
@@ -153,6 +158,7 @@ class Guidance:
         """Begin a mode in flight, from where the vehicle holds."""
         self.speed = math.nan
         self._return = None
+        self._at_floor = False
         if mode is Mode.MISSION:
             self._mission.start()
 
@@ -322,10 +328,34 @@ class Guidance:
             way = -1.0 if view.load_attached else 1.0
             x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
             position = (x, y, z)
+        acceleration = asked.acceleration
+        deep = too_deep(position[2], velocity[2], self._height(view), self._floor(view), self._parameters)
+        if deep:
+            x, y, z = position
+            position = (x, y, self._floor(view) if math.isnan(z) else z)
+            velocity, acceleration = (*velocity[:2], 0.0), (*acceleration[:2], math.nan)
+        self._say_floor(deep, view)
         plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
         self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
         body = controlled_body(view)
         if plain:
             self._stay_at(position, body)
             return Goto(body, position, self._yaw, self._parameters["MPC_XY_VEL_MAX"])
-        return Follow(body, position, velocity, asked.acceleration, asked.yaw, asked.yaw_rate)
+        return Follow(body, position, velocity, acceleration, asked.yaw, asked.yaw_rate)
+
+    def _height(self, view: VehicleView) -> float:
+        """Of the controlled body, m ENU."""
+        return (view.load_position if view.load_attached else view.position)[2]
+
+    def _floor(self, view: VehicleView) -> float:
+        """Least height of the controlled body, m ENU; -inf without a ground."""
+        fence = self.fence(view.load_attached)
+        return self._controlled((0.0, 0.0, fence.home[2] + fence.least_height), view)[2]
+
+    def _say_floor(self, deep: bool, view: VehicleView) -> None:
+        if deep and not self._at_floor:
+            least = self.fence(view.load_attached).least_height
+            self._pilot.say(
+                WARNING, f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"
+            )
+        self._at_floor = deep

@@ -57,6 +57,18 @@ def limited_velocity(velocity: Triple, p: Parameters) -> Triple:
     return (velocity[0] * scale, velocity[1] * scale, up)
 
 
+def too_deep(position: float, velocity: float, here: float, floor: float, p: Parameters) -> bool:
+    """Whether a set-point's upward position (m, NaN: none) and velocity (m/s, NaN: none) end below a floor.
+
+    `here`: m, where the body is. A velocity alone has to leave room to stop in; with a position, which has
+    been checked itself, it counts only when it has carried the body below (no newer set-point has come).
+    """
+    if not velocity < 0.0:
+        return False
+    stop = stopping_distance(-velocity, p["MPC_ACC_HOR"]) if math.isnan(position) else 0.0
+    return here - floor <= stop
+
+
 def limited_speed(speed: float, p: Parameters) -> float:
     """A speed that was asked for (m/s; NaN or not positive: the default) within the envelope."""
     return min(speed if speed > 0 else p["MPC_XY_CRUISE"], p["MPC_XY_VEL_MAX"])

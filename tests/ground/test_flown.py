@@ -90,6 +90,32 @@ def test_set_points_at_random_do_not_upset_it(seed: int) -> None:
     assert flight.station.machine.mode.name == "OFFBOARD", client.texts()
 
 
+@pytest.mark.parametrize("down", [0.4, 1.5])
+def test_a_velocity_downwards_ends_above_the_ground(down: float) -> None:
+    flight, client = flying()
+    clearance = flight.station.parameters["LND_CLEARANCE"]
+
+    def at_20_hz() -> None:
+        if round(flight.now * 250.0) % 12 == 0:
+            setpoint(client, NAN, NAN, NAN, 0.5, 0.0, down, *[NAN] * 3, target=(1, 1))
+
+    flight.run(2.0)
+    command = mavlink.MAVLink_command_long_message(1, 1, 192, 0, -1, 1, 0, NAN, NAN, NAN, 488.0 + 5.0)
+    assert client.ask(command).result == 0
+    flight.run(5.0)
+    flight.every_tick = at_20_hz
+    flight.run(0.2)
+    assert client.command(176, 1, 6, 0).result == 0
+    flight.run(12.0)
+    assert flight.station.machine.mode.name == "OFFBOARD", client.texts()
+    told = [text for text in client.texts() if "down too far" in text]
+    assert len(told) == 1
+    end = flight.flown(3.0)
+    assert flight.flown(12.0).load[:, 2].min() > 0.8 * clearance
+    assert end.load[-1, 2] < 1.3 * clearance
+    assert np.ptp(end.load[:, 1]) > 1.0  # north, as asked
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 10.0, 1e3])
 def test_whatever_weights_are_set_in_flight_it_goes_on_flying(factor: float) -> None:
     """Weights whose gains do not carry the vehicle are refused with a reason."""
