@@ -96,7 +96,7 @@ class Machine:
 
     def arm(self, now: float) -> Verdict:
         """Arm, if the preconditions hold."""
-        if self.armed:
+        if self.armed and not self.terminated:
             return OK
         faults = self.arming_faults()
         if faults or self.view is None:
@@ -178,7 +178,9 @@ class Machine:
     def reposition(self, where: Reposition, change_mode: bool) -> Verdict:
         """Go to a point and hold there; what is NaN stays as it is."""
         view = self.view
-        if view is None or not self.flying or self.terminated:
+        if self.terminated:
+            return deny("Going there refused: the flight was terminated; disarm first")
+        if view is None or not self.flying:
             return not_now("Going there refused: not flying; take off first")
         if self.stage is Stage.ASCENT:
             return not_now("Going there refused: still taking off; wait until that is done (IN_AIR)")

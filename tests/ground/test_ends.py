@@ -35,6 +35,9 @@ def test_termination_is_for_good() -> None:
     assert beat.custom_mode == 10 << 16
     assert client.command(176, 1, 4, 3).result == DENIED
     assert client.command(22).result == DENIED
+    assert client.command(192, -1, 1, 0, NAN, NAN, NAN, 492.0).result == DENIED
+    assert client.command(400, 1).result == REJECTED
+    assert all("terminated; disarm first" in text for text in client.texts()[-4:]), client.texts()
     assert client.command(400, 0).result == ACCEPTED
     assert client.command(400, 1).result == ACCEPTED
 
