@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import Enum, auto
 
 from controller.ground.targets import Body, Goto
@@ -52,6 +53,13 @@ class Ascent:
     def carries(self) -> bool:
         """Whether the load is controlled already."""
         return self.step in (Step.CARRY, Step.DONE)
+
+    def change_height(self, height: float) -> None:
+        """End at another height of the vehicle, m ENU."""
+        if self.step in (Step.CARRY, Step.ALONE):
+            x, y, z = self._target.position
+            self._target = replace(self._target, position=(x, y, z + height - self.height))
+        self.height = height
 
     def target(self, view: VehicleView) -> Goto:
         """Where to go now; moves on to the next step when this one is done."""

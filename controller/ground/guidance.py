@@ -148,6 +148,13 @@ class Guidance:
         self._yaw = self._yaw if math.isnan(yaw) else yaw
         self.speed = speed
 
+    def ask_takeoff_height(self, altitude: float, view: VehicleView) -> None:
+        """Height of the vehicle, m ENU, of the take-off to come or under way; NaN: as it is, or the default."""
+        if self.stage is not Stage.ASCENT or self._ascent is None:
+            self.takeoff_height = altitude
+        elif not math.isnan(altitude):
+            self._ascent.change_height(self.height_of_takeoff(altitude, view))
+
     def break_off_landing(self) -> None:
         """Fly on, if the load still hangs; one that lies is picked up by a take-off."""
         if self.stage is Stage.DESCENT and not self.load_is_down:

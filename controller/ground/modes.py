@@ -170,9 +170,8 @@ class Machine:
         fault = fence.outside((fence.home[0], fence.home[1], height))
         if fault:
             return deny(f"Take-off refused: {fault}")
-        self._guidance.takeoff_height = altitude
-        if self.stage is not Stage.ASCENT:
-            self.enter(Mode.TAKEOFF)
+        self.enter(Mode.TAKEOFF)
+        self._guidance.ask_takeoff_height(altitude, self.view)
         return OK
 
     def reposition(self, where: Reposition, change_mode: bool) -> Verdict:
@@ -319,6 +318,7 @@ class Machine:
     def set_mode_to(self, mode: Mode) -> None:
         """Have another mode, and say so."""
         if mode is not self.mode:
+            self._guidance.takeoff_height = math.nan  # it was asked of the mode that is left
             self.mode = mode
             self.say(INFO, f"Mode: {mode.title}")
 

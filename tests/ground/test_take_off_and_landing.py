@@ -9,7 +9,16 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.guidance import Stage
 from controller.ground.targets import Body, Goto
-from tests.ground.in_flight import ACCEPTED, DENIED, HOME_HEIGHT, REJECTED, flying, mode
+from tests.ground.in_flight import (
+    ACCEPTED,
+    DENIED,
+    HOME_HEIGHT,
+    REJECTED,
+    flying,
+    local_setpoint,
+    mode,
+    stream,
+)
 from tests.ground.kinematic import PROFILE, ZURICH
 from tests.ground.rig import NAN, Rig
 
@@ -58,6 +67,37 @@ def test_a_take_off_too_low_for_the_load_goes_higher_and_says_so() -> None:
     rig.run(3.0)
     assert rig.view.load_position[2] > 0.4
     assert any("so that the load leaves the ground" in text for text in client.texts())
+
+
+@pytest.mark.parametrize("asked_in", ["LIFT", "CARRY"])
+@pytest.mark.parametrize("height", [3.0, 6.0])
+def test_another_altitude_while_climbing_is_climbed_to(asked_in: str, height: float) -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    assert client.command(400, 1).result == ACCEPTED
+    assert client.command(22, *(NAN,) * 6, 488.0 + HOME_HEIGHT + 4.0).result == ACCEPTED
+    body = Body.LOAD if asked_in == "CARRY" else Body.VEHICLE
+    rig.run_until(lambda: getattr(rig.target, "body", None) is body)
+    assert client.command(22, *(NAN,) * 6, 488.0 + HOME_HEIGHT + height).result == ACCEPTED
+    assert client.command(22).result == ACCEPTED  # without an altitude: it stays
+    rig.run_until(lambda: mode(rig) == "HOLD")
+    rig.run(5.0)
+    assert rig.view.position[2] == pytest.approx(height + HOME_HEIGHT, abs=0.25)
+
+
+def test_the_altitude_of_a_take_off_is_not_another_modes() -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    assert client.command(22, *(NAN,) * 6, 488.0 + HOME_HEIGHT + 1.0).result == ACCEPTED  # too low
+    assert client.command(176, 1, 4, 3).result == ACCEPTED
+    assert client.command(400, 1).result == ACCEPTED
+    stream(rig, client, local_setpoint(0, 0, -4), 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, local_setpoint(0, 0, -4), 12.0)
+    assert rig.view.position[2] == pytest.approx(4.0, abs=0.25)
+    assert not any("so that the load leaves the ground" in text for text in client.texts())
 
 
 @pytest.mark.parametrize("altitude", [math.inf, 100.0, 488.0, 5000.0])
