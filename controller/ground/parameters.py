@@ -81,8 +81,8 @@ class Parameters:
         """Take values from a file; returns a line for each that is not taken."""
         faults = []
         for name, value in values.items():
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            fault = self.set(name, _in_float32(name, value)) if number else f"{name}: not a number"
+            number = _number(value)
+            fault = f"{name}: not a number" if number is None else self.set(name, _in_float32(name, number))
             faults += [fault] if fault else []
         return faults
 
@@ -165,6 +165,16 @@ class Parameters:
 def _inside(p: Parameter, value: float) -> bool:
     """Within the range, whose ends count although they are no float32 numbers."""
     return bool(_single(p.minimum) <= value <= _single(p.maximum))
+
+
+def _number(value: object) -> float | None:
+    """A number of a file, infinite if it is too large; None if it is none."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _single(value: float) -> float:

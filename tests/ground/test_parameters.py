@@ -191,7 +191,18 @@ def test_parameters_are_kept_in_a_file_on_request(tmp_path: Path) -> None:
     assert again.station.parameters["MIS_TAKEOFF_ALT"] == 7.25
 
 
-@pytest.mark.parametrize("content", ["{", "[]", "\0\xff", '{"MIS_TAKEOFF_ALT": 1e999}', "[" * 100000])
+@pytest.mark.parametrize(
+    "content",
+    [
+        "{",
+        "[]",
+        "\0\xff",
+        '{"MIS_TAKEOFF_ALT": 1e999}',
+        "[" * 100000,
+        '{"MIS_TAKEOFF_ALT": 1' + "0" * 400 + "}",
+        '{"GF_ACTION": -1' + "0" * 400 + "}",
+    ],
+)
 def test_a_corrupt_file_is_survived_with_a_message(tmp_path: Path, content: str) -> None:
     path = tmp_path / "parameters.json"
     path.write_text(content, encoding="latin-1")
@@ -199,7 +210,8 @@ def test_a_corrupt_file_is_survived_with_a_message(tmp_path: Path, content: str)
     client = rig.client()
     rig.run(0.1)
     assert rig.station.parameters["MIS_TAKEOFF_ALT"] == 2.5
-    assert any("arameters" in text for text in client.texts())
+    assert rig.station.parameters.integer("GF_ACTION") == 3
+    assert len([text for text in client.texts() if "arameters" in text]) == 1
 
 
 def test_what_is_good_in_a_file_is_kept_and_what_is_not_is_named(tmp_path: Path) -> None:
