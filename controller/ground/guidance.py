@@ -149,7 +149,7 @@ class Guidance:
         self.speed = speed
 
     def ask_takeoff_height(self, altitude: float, view: VehicleView) -> None:
-        """Height of the vehicle, m ENU, of the take-off to come or under way; NaN: as it is, or the default."""
+        """Height (vehicle, m ENU) of the take-off to come or under way; NaN: the default, or as it is."""
         if self.stage is not Stage.ASCENT or self._ascent is None:
             self.takeoff_height = altitude
         elif not math.isnan(altitude):
