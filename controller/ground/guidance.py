@@ -300,15 +300,19 @@ class Guidance:
 
     def _fly_mission(self, view: VehicleView) -> Target:
         hanging = self._profile.hover_length if view.load_attached else 0.0
-        home, radius = self.home_geodetic(), self._parameters["NAV_ACC_RAD"]
-        step = self._mission.advance(
-            view, lambda item: plan.place(item, self._profile, home), hanging, radius
-        )
+        radius = self._parameters["NAV_ACC_RAD"]
+        step = self._mission.advance(view, lambda item: self._place(item, view), hanging, radius)
         if isinstance(step, Then):
             self._after_mission(step, view)
         else:
             self.go_to(step.point, step.yaw, self._mission.speed, view)
         return self._hold(view)
+
+    def _place(self, item: plan.Item, view: VehicleView) -> Triple:
+        """Of the vehicle, m: as the item says, or as high as the load needs (where it takes off or lands)."""
+        x, y, z = plan.place(item, self._profile, self.home_geodetic())
+        fence = self.fence(view.load_attached)
+        return (x, y, max(z, fence.home[2] + fence.least_height))
 
     def _after_mission(self, then: Then, view: VehicleView) -> None:
         if then is Then.RETURN:

@@ -17,6 +17,7 @@ from controller.ground.plan import (
     LOITER,
     LOITER_TIME,
     RETURN,
+    TAKEOFF,
     WAYPOINT,
     WITH_POSITION,
     Item,
@@ -73,6 +74,8 @@ class MissionFlight:
         """Items reached and not yet announced."""
         self._jumps: dict[int, int] = {}
         self._since: float | None = None
+        self._here: Triple | None = None
+        """m, where the vehicle was when an item began that only has a height"""
         self._arrived = False
 
     def jump(self, seq: int) -> str:
@@ -125,7 +128,7 @@ class MissionFlight:
         self, item: Item, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
     ) -> Waypoint | Then | None:
         """An item that takes time; None when it is over."""
-        point = place(item) if item.has_place and item.command in WITH_POSITION else None
+        point = self._point(item, view, place)
         wait = 0.0
         if item.command == LOITER:
             wait = math.inf
@@ -145,6 +148,16 @@ class MissionFlight:
                 return self._over(item)
         yaw = math.nan if math.isnan(item.p4) or point is None else yaw_from_heading(math.radians(item.p4))
         return Waypoint(point, yaw)
+
+    def _point(self, item: Item, view: VehicleView, place: Callable[[Item], Triple]) -> Triple | None:
+        """Where the vehicle has to be for an item, m ENU; None: where it is."""
+        if item.has_place:
+            return place(item)
+        if item.command != TAKEOFF:
+            return None
+        if self._here is None:
+            self._here = view.position
+        return (*self._here[:2], place(item)[2])
 
     def _over(self, item: Item) -> Then | None:
         self.reached.append(self.current)
@@ -176,6 +189,7 @@ class MissionFlight:
         self._leave()
 
     def _leave(self) -> None:
+        self._here = None
         self._arrived = False
         self._since = None
 

@@ -114,8 +114,8 @@ def _check_place(item: Item, profile: Profile, home: Geodetic, fence: Fence) -> 
     if item.command == LAND and not profile.has_ground:
         return Fault(mavlink.MAV_MISSION_UNSUPPORTED, "there is no ground to land on")
     point = place(item, profile, home)
-    if not item.has_place:
-        return None
+    if not item.has_place:  # above home, as far as the fence can tell before the flight
+        point = (fence.home[0], fence.home[1], point[2])
     fault = fence.outside(point) or ("" if item.command in (LAND, TAKEOFF) else fence.too_low(point))
     if not fault:
         return None

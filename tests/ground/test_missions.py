@@ -145,6 +145,7 @@ def test_a_half_finished_upload_changes_nothing() -> None:
         (waypoint(0, 0, 1.0), mavlink.MAV_MISSION_INVALID_PARAM7, "too low for the load"),
         (waypoint(0, 0, 500.0), mavlink.MAV_MISSION_DENIED, "GF_MAX_VER_DIST"),
         (waypoint(2000, 0), mavlink.MAV_MISSION_DENIED, "GF_MAX_HOR_DIST"),
+        ((6, *other(22)[1:9], 500.0), mavlink.MAV_MISSION_DENIED, "GF_MAX_VER_DIST"),
         ((*waypoint(0, 0)[:7], 2_000_000_000, 0, 5.0), mavlink.MAV_MISSION_INVALID_PARAM5_X, "latitude"),
         ((*waypoint(0, 0)[:7], 0, 2_000_000_000, 5.0), mavlink.MAV_MISSION_INVALID_PARAM6_Y, "longitude"),
         (other(177, 9, 1), mavlink.MAV_MISSION_INVALID_PARAM1, "jump to item 9"),
@@ -283,6 +284,36 @@ def test_a_mission_from_the_ground_takes_off_first() -> None:
     assert client.command(176, 1, 4, 4).result == 0
     assert client.command(400, 1).result == 0
     rig.run_until(lambda: rig.station.machine.mission.state == mavlink.MISSION_STATE_COMPLETE, 200)
+
+
+def test_a_take_off_without_a_place_is_flown_to_its_height_where_the_vehicle_is() -> None:
+    rig = Rig()
+    client = rig.client()
+    up = (6, *other(22)[1:9], 8.0)
+    heights = []
+    rig.before_step = lambda: heights.append(rig.view.position)
+    assert flown(rig, client, [waypoint(4, 0), up, waypoint(4, 4)]) == [0, 1, 2]
+    assert max(z for _, _, z in heights) == pytest.approx(8.0 + rig.station.machine.home[2], abs=1.0)
+    reached = [(x, y) for x, y, z in heights if z > 6.5]
+    assert reached[0] == pytest.approx((0.0, 4.0), abs=1.1)  # where the item before was reached
+
+
+@pytest.mark.parametrize("command", [21, 22])
+def test_take_off_and_landing_at_a_place_keep_the_load_off_the_ground_on_the_way(command: int) -> None:
+    rig = Rig()
+    client = rig.client()
+    at = waypoint(4, 4, 0.0 if command == 21 else 0.5)
+    item = (at[0], command, *at[2:])
+    assert Uploader(client, [waypoint(4, 0), item, waypoint(4, 6)]).run() == ACCEPTED, client.texts()
+    rig.fly(client)
+    assert client.command(300, 0, 0).result == 0
+    rig.run_until(lambda: bool(client.got("MISSION_ITEM_REACHED")))
+    lowest = math.inf
+    while 1 not in [m.seq for m in client.got("MISSION_ITEM_REACHED")]:
+        rig.run(0.1)
+        lowest = min(lowest, rig.view.load_position[2])
+        assert rig.now < 300.0
+    assert lowest > 0.4
 
 
 def test_jumps_delays_return() -> None:
