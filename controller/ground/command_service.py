@@ -10,7 +10,7 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground import telemetry
-from controller.ground.commands import Command, Memory, Requests, command_of, execute
+from controller.ground.commands import Command, Key, Memory, Requests, command_of, execute
 from controller.ground.modes import Machine
 from controller.ground.outbox import Outbox
 from controller.ground.peers import Peer
@@ -50,10 +50,9 @@ class CommandService:
     def receive(self, message: Any, frame: Frame, peer: Peer, to_load: bool, now: float) -> None:
         """A command for the vehicle or the load."""
         command = command_of(message, to_load)
-        # What the retransmission has in common with the original: everything but the counters.
         sender = (peer.address, frame.system, frame.component)
         numbers = struct.pack("<7d", *_finite(command))
-        key = (sender, message.id, to_load, command.number, numbers)
+        key = Key(sender, (message.id, to_load, command.number, numbers))
         confirmation = getattr(message, "confirmation", 0)
         sequence = frame.raw[4 if frame.version == 2 else 2]
 

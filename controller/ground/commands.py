@@ -17,7 +17,9 @@ from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, yaw_from_heading
 FORCE = 21196.0
 """param2 of an arm or disarm command that is meant in any case"""
 MEMORY = 5.0
-"""s, in which the same command again is taken for a retransmission"""
+"""s, in which the same command with a greater confirmation is taken for a retransmission"""
+DOUBLED = 0.2
+"""s, in which the same command with the same sequence number is taken for a datagram that came twice"""
 _MOST_REMEMBERED = 64
 _UNSET_INT = 0x7FFFFFFF
 _CUSTOM_MODE_ENABLED = 1
@@ -94,13 +96,30 @@ class Requests(Protocol):
         """A STATUSTEXT that comes with an acceptance."""
 
 
+class Key(NamedTuple):
+    """What a retransmission has in common with the original: everything but the counters."""
+
+    sender: Hashable
+    content: Hashable
+
+
+class _Remembered(NamedTuple):
+    time: float
+    """s, when it was carried out"""
+    sequence: int
+    """Of the frame"""
+    confirmation: int
+    verdict: Verdict
+
+
 class Memory:
     """Recent commands of each sender with their results, to know a retransmission by."""
 
     def __init__(self) -> None:
-        self._recent: OrderedDict[Hashable, tuple[float, int, int, Verdict]] = OrderedDict()
+        self._recent: OrderedDict[Key, _Remembered] = OrderedDict()
+        """The oldest first"""
 
-    def recall(self, key: Hashable, sequence: int, confirmation: int, now: float) -> Verdict | None:
+    def recall(self, key: Key, sequence: int, confirmation: int, now: float) -> Verdict | None:
         """The result of the command that this one repeats, None if it is a new one.
 
         A repetition has a greater confirmation, or is the same datagram once more.
@@ -108,14 +127,24 @@ class Memory:
         found = self._recent.get(key)
         if found is None:
             return None
-        time, old_sequence, old_confirmation, verdict = found
-        repeated = confirmation > old_confirmation or sequence == old_sequence
-        return verdict if repeated and now - time <= MEMORY else None
+        age = now - found.time
+        doubled = sequence == found.sequence and age <= DOUBLED and self._counts(key, sequence)
+        repeated = doubled or (confirmation > found.confirmation and age <= MEMORY)
+        return found.verdict if repeated else None
 
-    def store(self, key: Hashable, sequence: int, confirmation: int, verdict: Verdict, now: float) -> None:
+    def _counts(self, key: Key, sequence: int) -> bool:
+        """Whether no other command that came since from the same sender has the same sequence number."""
+        for other, since in reversed(self._recent.items()):
+            if other == key:
+                break
+            if other.sender == key.sender and since.sequence == sequence:
+                return False
+        return True
+
+    def store(self, key: Key, sequence: int, confirmation: int, verdict: Verdict, now: float) -> None:
         """Remember a command's result."""
         self._recent.pop(key, None)
-        self._recent[key] = (now, sequence, confirmation, verdict)
+        self._recent[key] = _Remembered(now, sequence, confirmation, verdict)
         while len(self._recent) > _MOST_REMEMBERED:
             self._recent.popitem(last=False)
 

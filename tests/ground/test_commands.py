@@ -87,6 +87,36 @@ def test_a_doubled_datagram_has_one_effect() -> None:
     assert len(client.texts()) == 1
 
 
+def test_a_sender_whose_sequence_numbers_do_not_count_gets_what_it_asks_for() -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    for on in (1, 0, 1, 0, 1):
+        client.packer.sequence = 0
+        assert client.command(400, on).result == ACCEPTED
+        assert rig.station.armed == bool(on)
+    rig.run(0.5)
+    for _ in range(2):
+        client.packer.sequence = 0
+        assert client.command(400, 3).result == DENIED
+        rig.run(0.5)
+    assert len([text for text in client.texts() if "use 1 or 0" in text]) == 2  # asked anew
+
+
+def test_a_datagram_that_comes_late_once_more_does_not_arm_again() -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    arm, disarm = (
+        client.packer.pack(mavlink.MAVLink_command_long_message(1, 1, 400, 0, on, *(NAN,) * 6))
+        for on in (1, 0)
+    )
+    client.send_raw(arm, disarm, arm)
+    rig.run(0.1)
+    assert [a.result for a in client.got("COMMAND_ACK")] == [ACCEPTED] * 3
+    assert not rig.station.armed
+
+
 def test_a_command_gets_through_a_lossy_link() -> None:
     rig = Rig()
     client = rig.client(channel=Channel(loss=0.3, duplication=0.2, reordering=0.2, seed=4))
