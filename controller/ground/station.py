@@ -82,7 +82,8 @@ class Station:
         self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
         self.missions = Missions(self.machine.accept_plan)
-        self.peers = Peers(standard_peers(profile.instance) if peers is None else peers, now)
+        standard = standard_peers(profile.instance) if peers is None else peers
+        self.peers = Peers(standard, now, self._forget)
         self.dropped = 0
         """Datagrams and frames that were not taken"""
         self._signing = signing
@@ -136,6 +137,11 @@ class Station:
         if frame.system == _BROADCAST or source in (self._out.vehicle, self._out.load):
             return False  # nobody, or ourselves; a companion computer may share the vehicle's system
         return self._signing is None or self._signing.accepts(frame, now)
+
+    def _forget(self, address: Address) -> None:
+        """A peer is no more: what was under way with it ends."""
+        self.missions.forget(address)
+        self._load.forget(address)
 
     def hear_plant(self, frame: Frame, now: float) -> None:
         """What the plant says: the load's own messages, and answers to what was passed on to it."""
@@ -209,9 +215,7 @@ class Station:
             return []
         if now >= self._housekeeping:
             self._housekeeping = now + _HOUSEKEEPING
-            for address in self.peers.forget_silent(now):
-                self.missions.forget(address)
-                self._load.forget(address)
+            self.peers.forget_silent(now)
         self._send_streams(now)
         table = {peer.address: peer for peer in self.peers}
         for address, message in self.parameters.to_send(table, now):

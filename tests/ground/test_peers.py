@@ -79,6 +79,29 @@ def test_there_is_an_end_to_peers() -> None:
     assert len(list(rig.station.peers)) == 2
 
 
+def test_ports_that_are_no_lasting_clients_lock_nobody_out() -> None:
+    rig = Rig()
+    ping = mavlink.MAVLink_ping_message(1, 1, 0, 0)
+    strays = [rig.client(port) for port in range(40000, 40000 + MOST_PEERS)]
+    friend = rig.client(50000)
+    for stray in strays[:5]:
+        stray.heartbeat()  # these were clients
+    for stray in strays[5:]:
+        stray.send(ping)
+    for _ in range(4):
+        for stray in strays[5:]:
+            stray.send(ping)
+        friend.heartbeat()
+        rig.run(2.0)
+    assert friend.address in {peer.address for peer in rig.station.peers}
+    assert len(friend.got("HEARTBEAT")) >= 7
+    assert len(list(rig.station.peers)) == MOST_PEERS
+    friends = [rig.client(port) for port in range(51000, 51000 + MOST_PEERS - 3)]
+    for each in friends:
+        each.heartbeat()  # in the places of what has sent no HEARTBEAT, and then of clients long silent
+    assert {each.address for each in (friend, *friends)} <= {peer.address for peer in rig.station.peers}
+
+
 def test_mavlink_1_is_answered_in_mavlink_1_until_the_peer_knows_better() -> None:
     rig = Rig()
     old, new = rig.client(), rig.client(14540, link=1)
