@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -16,7 +17,8 @@ from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 TEXT_LENGTH = 50
 """Characters of one STATUSTEXT; longer texts go in pieces"""
 TEXT_PAUSE = 2.0
-"""s, in which the same text is not said twice to a peer"""
+"""s, in which the same text, whatever its numbers, is not said twice to a peer"""
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 _MOST_TEXTS = 64
 """Texts that are remembered for that"""
 
@@ -61,10 +63,11 @@ class Outbox:
             self.send(peer, mavlink.MAVLink_statustext_message(notice.severity, piece, number, index), now)
 
     def say_seldom(self, peer: Peer, text: str, now: float) -> None:
-        """Something that a stream of messages gives rise to again and again."""
-        last = peer.last_texts.get(text)
+        """Something that a stream of messages gives rise to again and again, with other numbers each time."""
+        kind = _NUMBER.sub("#", text)
+        last = peer.last_texts.get(kind)
         if last is None or now - last >= TEXT_PAUSE:
             if len(peer.last_texts) > _MOST_TEXTS:
                 peer.last_texts.clear()
-            peer.last_texts[text] = now
+            peer.last_texts[kind] = now
             self.say(peer, Notice(WARNING, text), now)

@@ -53,6 +53,7 @@ class Peer:
         self.sequences: dict[tuple[int, int], int] = {}
         self.text_id = 0
         self.last_texts: dict[str, float] = {}
+        """When a text was said last that must not be said at every message, by its kind"""
 
     def hear(self, frame: Frame, now: float) -> None:
         """Note that a good frame came."""

@@ -82,6 +82,15 @@ def test_set_points_that_cannot_be_flown_are_refused_and_do_not_count(message: A
     assert client.command(176, 1, 6, 0).result == REJECTED
 
 
+def test_set_points_that_move_outside_the_fence_are_refused_in_a_word_now_and_then() -> None:
+    rig, client = flying()
+    before = len(client.texts())
+    for metres in range(100):
+        client.send(local_setpoint(600 + metres, 0, -5))
+        rig.run(0.1)
+    assert 4 <= len(client.texts()) - before <= 6  # one in TEXT_PAUSE
+
+
 def test_one_client_at_a_time_has_offboard_control() -> None:
     rig, client = flying()
     other = rig.client(14540, link=1)
