@@ -23,6 +23,8 @@ from sitl_bridge.mavlink.framing import Frame
 
 _MISSION_COMPONENTS = (0, COMPONENT_AUTOPILOT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 _BROADCAST = 0
+_FTP_ANSWERS = 128
+"""Opcodes of FTP from here on are answers, ACK and NAK"""
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
     mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
@@ -167,6 +169,8 @@ class Inbox:
         if message.target_system != self._profile.system:
             return
         request = bytes(message.payload)
+        if request[3] >= _FTP_ANSWERS:
+            return  # two ends that refuse each other's refusals would never stop
         sequence = int.from_bytes(request[:2], "little") + 1 & 0xFFFF
         # Sequence, session, NAK, size 1, requested opcode, burst, padding, offset; UnknownCommand.
         answer = sequence.to_bytes(2, "little") + bytes((request[2], 129, 1, request[3], 0, 0, 0, 0, 0, 0, 7))

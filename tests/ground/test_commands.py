@@ -249,6 +249,16 @@ def test_pings_time_and_ftp() -> None:
     assert bytes(nak.payload[:13]) == bytes((6, 0, 0, 129, 1, 4, 0, 0, 0, 0, 0, 0, 7))
 
 
+@pytest.mark.parametrize("opcode", [128, 129, 255])
+def test_an_answer_of_ftp_is_not_answered(opcode: int) -> None:
+    rig = Rig()
+    client = rig.client()
+    payload = bytes((5, 0, 0, opcode)).ljust(251, b"\0")
+    client.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload))
+    rig.run(0.04)
+    assert not client.got("FILE_TRANSFER_PROTOCOL")
+
+
 def test_every_refusal_has_a_text() -> None:
     """Whatever is refused in a fresh vehicle, somebody is told why."""
     for number in range(3100):
