@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import binascii
-import importlib
 import struct
 from typing import Any, NamedTuple
 
+from pymavlink.dialects.v10 import common as v1
 from pymavlink.dialects.v20 import common as mavlink
 
 from sitl_bridge.mavlink.framing import FLAG_SIGNED, MAGIC_V1, MAGIC_V2, Frame, decode
 
 _BITS_REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
-LARGEST_V1_ID = 255
+_V1_LENGTHS: dict[int, int] = {number: kind.unpacker.size for number, kind in v1.mavlink_map.items()}
+"""Bytes of payload by message number. Read at start-up, by 20 ms: the control loop has no time for it."""
 
 
 def checksum(data: bytes) -> int:
@@ -114,11 +115,9 @@ def frame_v1(
     payload: bytes, message_id: int, crc_extra: int, sequence: int, system: int, component: int
 ) -> bytes | None:
     """A MAVLink 1 frame: extension fields cut off. None if MAVLink 1 has no such message."""
-    if message_id > LARGEST_V1_ID:
+    length = _V1_LENGTHS.get(message_id)
+    if length is None:
         return None
-    known = importlib.import_module("pymavlink.dialects.v10.common").mavlink_map.get(message_id)
-    if known is None:
-        return None
-    payload = payload[: known.unpacker.size]
+    payload = payload[:length]
     body = bytes((len(payload), sequence, system, component, message_id)) + payload
     return b"%c%b%b" % (MAGIC_V1, body, checksum(body + bytes((crc_extra,))).to_bytes(2, "little"))

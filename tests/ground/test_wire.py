@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 from typing import Any
 
 import pytest
@@ -44,6 +46,19 @@ def test_mavlink_1_has_no_extension_fields() -> None:
     writer = v1.MAVLink(None, srcSystem=1, srcComponent=1)
     expected = v1.MAVLink_command_ack_message(400, 0).pack(writer)
     assert frame_v1(*ours, 0, 1, 1) == expected
+
+
+def test_nothing_is_imported_for_the_first_frame_of_mavlink_1() -> None:
+    """Imports take longer than the control loop has."""
+    program = """
+import sys
+from controller.ground_link import GroundLink
+from controller.ground.wire import frame_v1
+before = set(sys.modules)
+assert frame_v1(bytes(9), 0, 50, 0, 1, 1)
+assert set(sys.modules) == before, set(sys.modules) - before
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)
 
 
 def test_mavlink_1_cannot_say_everything() -> None:
