@@ -67,6 +67,7 @@ class GroundLink:
             raise OSError(f"ground control's UDP ports {numbers}: {error.strerror or error}") from None
         profile = profile_of(vehicle, instance, has_ground=vehicle.ground is not None)
         self.station = Station(profile, time.monotonic(), storage, signing, peers)
+        self._signing = signing
         if options.exposed:
             guard = (
                 "to whoever has the signing key" if signing else "to ANYBODY on the network, without a key"
@@ -80,6 +81,8 @@ class GroundLink:
 
     def exchange(self, now: float) -> None:
         """Take in what has come, send what is due."""
+        if self._signing is not None:
+            self._signing.keep_time(now, time.time())
         self._sockets.exchange(self.station, now)
 
     def close(self) -> None:

@@ -48,11 +48,19 @@ class Signing:
     """
 
     def __init__(self, key: bytes, unix_time_at_zero: float) -> None:
+        """unix_time_at_zero: Unix time (s) at the station's time 0, until `keep_time` says it anew."""
         self._key = key
         self._zero = unix_time_at_zero
         self._latest: dict[tuple[int, int, int], int] = {}
         self._timestamp = 0
         self.refused = 0
+
+    def keep_time(self, now: float, unix_time: float) -> None:
+        """It is `unix_time` (s): the station's clock stands still when the machine does, the senders' do not.
+
+        Our time stamps go on from where they are when the time is set back.
+        """
+        self._zero = unix_time - now
 
     def _now(self, now: float) -> int:
         return max(self._timestamp, int((now + self._zero - EPOCH) * TICKS_PER_SECOND))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+import socket
+import time
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +12,8 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.signing import EPOCH, KeyFileError, Signing, read_key
+from controller.ground_link import GroundLink, GroundOptions, Ports
+from sitl_bridge.description import load_vehicle
 from tests.ground.rig import Client, Rig
 
 KEY = bytes(range(32))
@@ -105,6 +110,45 @@ def test_an_unsigned_peer_is_not_even_remembered() -> None:
     rig, _, _ = signed_rig()
     rig.client(50000).heartbeat()
     assert len(list(rig.station.peers)) == 2
+
+
+def time_stamps(client: Client) -> list[int]:
+    return [int.from_bytes(raw[-12:-6], "little") for raw in client.raw]
+
+
+def test_time_stamps_keep_to_the_time_of_day_and_never_go_back() -> None:
+    signing = Signing(KEY, UNIX_AT_ZERO)
+    rig = Rig(signing=signing)
+    client = rig.client()
+    rig.run(1.0)
+    hour = 3600.0
+    signing.keep_time(rig.now, rig.now + UNIX_AT_ZERO + hour)  # the machine slept
+    rig.run(1.0)
+    expected = (rig.now + UNIX_AT_ZERO + hour - EPOCH) * TICKS
+    assert time_stamps(client)[-1] == pytest.approx(expected, abs=TICKS)
+    recorded = Signer(rig, system=254)  # when the machine fell asleep
+    client.send_raw(recorded.pack(ping(1)))
+    signing.keep_time(rig.now, rig.now + UNIX_AT_ZERO)  # somebody has set the clock back
+    rig.run(1.0)
+    assert not pings(client)
+    stamps = time_stamps(client)
+    assert all(b > a for a, b in itertools.pairwise(stamps))
+
+
+def test_a_links_time_stamps_are_the_time_of_day(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_text(KEY.hex())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.bind(("127.0.0.1", 0))
+        client.settimeout(5.0)
+        ports = Ports(0, client.getsockname()[1])
+        options = GroundOptions(ports, Ports(0, 9), key)
+        link = GroundLink(load_vehicle("iris"), 0, options, lambda text: None)
+        link.exchange(time.monotonic() + 600.0)  # the loop's clock is another one
+        raw = client.recv(2048)
+        link.close()
+    stamp = int.from_bytes(raw[-12:-6], "little") / TICKS + EPOCH
+    assert stamp == pytest.approx(time.time(), abs=5.0)
 
 
 def test_keys_are_not_taken_over_a_link() -> None:
