@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.guidance import Stage
 from controller.ground.heartbeat import heartbeat
 from controller.ground.modes import Machine
-from controller.ground.px4_modes import SELECTABLE
+from controller.ground.px4_modes import Mode
 from controller.ground.setpoints import NOTHING
 from controller.ground.targets import Body, Follow, Goto, Land
 from controller.ground.view import VehicleView
@@ -414,9 +414,9 @@ def autopilot_version(machine: Machine) -> Any:
 
 def available_modes(index: float) -> list[Any]:
     """AVAILABLE_MODES of one mode (1, 2, …), or of all (0)."""
-    count = len(SELECTABLE)
+    count = len(Mode)
     return [
         AvailableModes(count, number, mode.standard_mode, mode.custom_mode, mode.properties, mode.title)
-        for number, mode in enumerate(SELECTABLE, start=1)
+        for number, mode in enumerate(Mode, start=1)
         if index in (0, number)
     ]

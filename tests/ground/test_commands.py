@@ -6,7 +6,9 @@ import math
 
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
+from pymavlink.dialects.v20 import development
 
+from controller.ground.px4_modes import Mode
 from tests.ground.rig import Channel, Rig
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -197,7 +199,12 @@ def test_available_modes() -> None:
     rig.run(0.1)
     assert client.command(512, 435, 0).result == ACCEPTED
     frames = [raw for raw in client.raw if raw[7] | raw[8] << 8 == 435]
-    assert len(frames) == 6
+    read = development.MAVLink(None).decode
+    modes = {m.custom_mode: m for m in (read(bytearray(raw)) for raw in frames)}
+    assert set(modes) == {mode.custom_mode for mode in Mode}  # every one that HEARTBEAT may show
+    assert {m.number_modes for m in modes.values()} == {len(Mode)}
+    hidden = [m.mode_name for m in modes.values() if m.properties & 2]  # NOT_USER_SELECTABLE
+    assert hidden == ["Termination"]
     assert client.command(512, 435, 2).result == ACCEPTED
     assert client.command(512, 435, 99).result == DENIED
 
