@@ -8,6 +8,7 @@ thing, so that ground stations show it where people look for it.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 
@@ -27,6 +28,18 @@ class Parameter(NamedTuple):
     def is_integer(self) -> bool:
         """Whether it is INT32 on the wire."""
         return isinstance(self.default, int)
+
+    def shown(self, value: float) -> str:
+        """A value for a person; an integer in all its digits."""
+        whole = self.is_integer and math.isfinite(value) and value == int(value)
+        return str(int(value)) if whole else f"{value:g}"
+
+    @property
+    def range(self) -> str:
+        """What it may be."""
+        if self.choices:
+            return ", ".join(f"{number} {word}" for number, word in self.choices)
+        return f"{self.shown(self.minimum)} to {self.shown(self.maximum)}"
 
 
 _LINK_ACTIONS = ((0, "none"), (1, "hold"), (2, "return"), (3, "land"), (5, "terminate"))
@@ -118,8 +131,7 @@ def markdown() -> str:
         "|---|---|---|---|---|",
     ]
     for p in TABLE:
-        allowed = ", ".join(f"{n} {word}" for n, word in p.choices) or f"{p.minimum:g} to {p.maximum:g}"
-        lines.append(f"| `{p.name}` | {p.default:g} | {allowed} | {p.unit} | {p.description} |")
+        lines.append(f"| `{p.name}` | {p.shown(p.default)} | {p.range} | {p.unit} | {p.description} |")
     return "\n".join(lines) + "\n"
 
 

@@ -58,7 +58,7 @@ class Parameters:
         if p.is_integer and value != int(value):
             return f"{name} = {value:g}: not an integer; {_allowed(p)}"
         inside = int(value) in dict(p.choices) if p.choices else _inside(p, value)
-        return "" if inside else f"{name} = {value:g} {p.unit}".rstrip() + f": {_allowed(p)}"
+        return "" if inside else f"{name} = {p.shown(value)} {p.unit}".rstrip() + f": {_allowed(p)}"
 
     def set(self, name: str, value: float) -> str:
         """Set a value; returns why not, or an empty string."""
@@ -196,9 +196,7 @@ def _kind(p: Parameter) -> int:
 
 
 def _allowed(p: Parameter) -> str:
-    if p.choices:
-        return "allowed: " + ", ".join(f"{number} {word}" for number, word in p.choices)
-    return f"allowed: {p.minimum:g} to {p.maximum:g} {p.unit}".rstrip()
+    return f"allowed: {p.range} {p.unit}".rstrip()
 
 
 def _error(name: str, index: int, error: int) -> Any:

@@ -11,7 +11,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.parameter_file import ParameterFile
-from controller.ground.parameter_table import BY_NAME, TABLE, markdown
+from controller.ground.parameter_table import BY_NAME, TABLE, Parameter, markdown
 from tests.ground.rig import Channel, Client, Rig
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
@@ -69,6 +69,19 @@ def test_the_table_is_sound() -> None:
 def test_the_documentation_is_the_table() -> None:
     page = Path(__file__).parents[2] / "docs" / "parameters.md"
     assert page.read_text(encoding="utf-8") == markdown()
+
+
+@pytest.mark.parametrize("p", [p for p in TABLE if p.is_integer], ids=lambda p: p.name)
+def test_integers_are_shown_in_all_their_digits(p: Parameter) -> None:
+    (row,) = (line for line in markdown().splitlines() if f"`{p.name}`" in line)
+    assert f"| {p.default} |" in row
+    assert p.choices or f"| {p.minimum} to {p.maximum} |" in row
+    rig = Rig()
+    client = rig.client()
+    client.send(set_message(p.name, p.minimum - 1, INT32))
+    rig.run(0.04)
+    assert client.texts()[0].startswith(f"{p.name} = {p.minimum - 1}")
+    assert p.choices or f"{p.minimum} to {p.maximum}" in client.texts()[0]
 
 
 def test_a_list_is_complete_and_paced() -> None:
