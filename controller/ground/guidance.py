@@ -35,6 +35,9 @@ from controller.ground.verdict import INFO, WARNING
 from controller.ground.view import Profile, VehicleView
 from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
+_STAY_AT_FLOOR = 0.3
+"""m above the room that a stop needs, within which a body that stops at the floor goes on to"""
+
 
 class Stage(Enum):
     """How far the vehicle is off the ground."""
@@ -340,12 +343,10 @@ class Guidance:
             x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
             position = (x, y, z)
         acceleration = asked.acceleration
-        deep = too_deep(position[2], velocity[2], self._height(view), self._floor(view), self._parameters)
+        deep = math.isnan(position[2]) and self._goes_too_deep(velocity[2], view)
         if deep:
-            x, y, z = position
-            position = (x, y, self._floor(view) if math.isnan(z) else z)
+            position = (position[0], position[1], self._floor(view))
             velocity, acceleration = (*velocity[:2], 0.0), (*acceleration[:2], math.nan)
-        self._say_floor(deep, view)
         plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
         self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
         body = controlled_body(view)
@@ -363,10 +364,14 @@ class Guidance:
         fence = self.fence(view.load_attached)
         return self._controlled((0.0, 0.0, fence.home[2] + fence.least_height), view)[2]
 
-    def _say_floor(self, deep: bool, view: VehicleView) -> None:
+    def _goes_too_deep(self, velocity: float, view: VehicleView) -> bool:
+        """Whether a set-point's upward velocity (m/s) has to end at the floor now; says so once."""
+        room = self._height(view) - self._floor(view) - (_STAY_AT_FLOOR if self._at_floor else 0.0)
+        own = (view.load_velocity if view.load_attached else view.velocity)[2]
+        deep = too_deep(velocity, own, room, self._parameters)
         if deep and not self._at_floor:
             least = self.fence(view.load_attached).least_height
-            self._pilot.say(
-                WARNING, f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"
-            )
+            text = f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"
+            self._pilot.say(WARNING, text)
         self._at_floor = deep
+        return deep

@@ -57,16 +57,12 @@ def limited_velocity(velocity: Triple, p: Parameters) -> Triple:
     return (velocity[0] * scale, velocity[1] * scale, up)
 
 
-def too_deep(position: float, velocity: float, here: float, floor: float, p: Parameters) -> bool:
-    """Whether a set-point's upward position (m, NaN: none) and velocity (m/s, NaN: none) end below a floor.
+def too_deep(asked: float, own: float, room: float, p: Parameters) -> bool:
+    """Whether a body that is `room` (m) above a floor has to stop now.
 
-    `here`: m, where the body is. A velocity alone has to leave room to stop in; with a position, which has
-    been checked itself, it counts only when it has carried the body below (no newer set-point has come).
+    Upwards: `asked`, its set-point's velocity (m/s, NaN: none), and `own`, which it has.
     """
-    if not velocity < 0.0:
-        return False
-    stop = stopping_distance(-velocity, p["MPC_ACC_HOR"]) if math.isnan(position) else 0.0
-    return here - floor <= stop
+    return asked < 0.0 and room <= stopping_distance(-min(asked, own), p["MPC_ACC_HOR"])
 
 
 def limited_speed(speed: float, p: Parameters) -> float:

@@ -116,6 +116,21 @@ def test_a_velocity_downwards_ends_above_the_ground(down: float) -> None:
     assert np.ptp(end.load[:, 1]) > 1.0  # north, as asked
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_velocities_at_random_keep_the_load_off_the_ground(seed: int) -> None:
+    flight, client = flying()
+    chance = random.Random(seed)
+    setpoint(client, NAN, NAN, NAN, 0.0, 0.0, 0.0, *[NAN] * 3, target=(1, 1))
+    flight.run(0.1)
+    assert client.command(176, 1, 6, 0).result == 0
+    for _ in range(40):
+        velocity = [chance.uniform(-2, 2), chance.uniform(-2, 2), chance.uniform(-1, 3)]
+        setpoint(client, NAN, NAN, NAN, *velocity, *[NAN] * 3, target=chance.choice([LOAD, (1, 1)]))
+        flight.run(chance.choice([0.02, 0.05, 0.4, 0.9]))
+    assert flight.station.machine.mode.name == "OFFBOARD", client.texts()
+    assert flight.flown(10.0).load[:, 2].min() > 0.5 * flight.station.parameters["LND_CLEARANCE"]
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 10.0, 1e3])
 def test_whatever_weights_are_set_in_flight_it_goes_on_flying(factor: float) -> None:
     """Weights whose gains do not carry the vehicle are refused with a reason."""
