@@ -94,7 +94,6 @@ def estimator_update_us(vehicle: Vehicle) -> float:
     tuning = tuning_for(vehicle, DEFAULT_RATE_HZ)
     estimator = Estimator(vehicle, 1.0 / DEFAULT_RATE_HZ, tuning)
     speeds = np.array(hover_rotor_speeds(vehicle))
-    still = (0.0, 0.0, 0.0)
     spread = round(DEFAULT_RATE_HZ * tuning.gps_period)
     late = round(DEFAULT_RATE_HZ * vehicle.sensors.gps.delay)
     times = []
@@ -107,7 +106,7 @@ def estimator_update_us(vehicle: Vehicle) -> float:
         estimator.magnetometer((east + tremor, north, height))
         estimator.barometer(0.0)
         if tick >= late and (tick - late) % spread == 0:
-            estimator.gps((tick - late) / DEFAULT_RATE_HZ, still, still)
+            estimator.gps((tick - late) / DEFAULT_RATE_HZ, (tremor, 0.0, 0.0), (0.0, 0.0, 0.0))
         began = time.perf_counter()
         estimator.tick(now)
         times.append(time.perf_counter() - began)
