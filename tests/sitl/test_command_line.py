@@ -123,3 +123,22 @@ def test_a_summary_is_json_whatever_happened(tmp_path: Path) -> None:
     write_report(tmp_path, facts, None)
     summary = json.loads((tmp_path / "summary.json").read_text(), parse_constant=no_constant)
     assert summary == dict.fromkeys(PROMISED) | {"completed": False, "bound": [1.0, None], "settled": False}
+
+
+@pytest.mark.parametrize("command", ["bench", "paper --out unused", "plant", "controller", "fly hover"])
+def test_an_interrupt_while_it_starts_is_one_line(command: str) -> None:
+    """Wherever it strikes, also where SIGINT was inherited as ignored: exit code 130 and no traceback."""
+    script = (
+        "import os, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "from sitl import start\n"
+        "class Strikes:\n"
+        "    def find_spec(self, name, *rest):\n"
+        "        if name == 'sitl.cli':\n"
+        "            os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Strikes())\n"
+        f"sys.argv[1:] = {command.split()!r}\n"
+        "sys.exit(start.main())\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (130, "sitl: interrupted\n")
