@@ -174,19 +174,18 @@ def _clock(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--clock",
         choices=("realtime", "lockstep"),
-        default="realtime",
-        help="against the wall clock, or tick by tick with the controller (default: realtime)",
+        help="against the wall clock, or tick by tick with the controller (default: realtime; for a plant "
+        "that waits on TCP, as PX4 wants it, lockstep at speed 1)",
     )
     parser.add_argument(
         "--speed",
         metavar="X",
         type=number(1e-3, 1e4, "a factor"),
-        help="with lockstep: at most X times real time (default: as fast as it goes)",
+        help="with lockstep: at most X times real time (default: as fast as both manage)",
     )
     parser.add_argument(
         "--on-silence",
         choices=("wait", "continue"),
-        default="wait",
         help="with lockstep: what to do when a tick stays unanswered after three repeats (default: wait)",
     )
 

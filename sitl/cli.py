@@ -7,9 +7,10 @@ import json
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sitl.arguments import build_parser
+from sitl.start import EXIT_INTERRUPTED
 from sitl_bridge.description import DescriptionError, load_vehicle
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 from sitl_bridge.process import Speaker, StopRequest
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
     from sitl.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
     from sitl_bridge.plant.faults import Faults
+    from sitl_bridge.plant.lockstep import OnSilence
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2
-EXIT_INTERRUPTED = 130
 
 
 def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
@@ -65,6 +66,31 @@ def _overrides(arguments: argparse.Namespace) -> list[str]:
     return [*preset, *arguments.set]
 
 
+class Timing(NamedTuple):
+    """How the plant keeps time."""
+
+    clock: Literal["realtime", "lockstep"]
+    speed: float | None
+    """Times real time; None: as fast as it goes, or real time's own."""
+    on_silence: OnSilence = "wait"
+
+
+AS_PX4_EXPECTS = Timing("lockstep", 1.0)
+"""Of who waits on TCP: its simulator waits for PX4's answer at each tick, and people steer it."""
+
+
+def _timing(arguments: argparse.Namespace, usual: Timing) -> Timing:
+    """What --clock, --speed and --on-silence ask for; `usual` where no clock is chosen."""
+    clock: Literal["realtime", "lockstep"] = arguments.clock or usual.clock
+    for flag, value in (("--speed", arguments.speed), ("--on-silence", arguments.on_silence)):
+        if value is not None and clock != "lockstep":
+            raise DescriptionError(
+                flag, ["goes with --clock lockstep; real time runs at speed 1 and waits for nobody"]
+            )
+    speed = usual.speed if arguments.speed is None and arguments.clock is None else arguments.speed
+    return Timing(clock, speed, arguments.on_silence or usual.on_silence)
+
+
 def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
     from sitl_bridge.plant.faults import Faults, checked
 
@@ -72,9 +98,9 @@ def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
 
 
 def _plant(arguments: argparse.Namespace) -> int:
-    if arguments.speed is not None and arguments.clock != "lockstep":
-        raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
     vehicle, scenario = _what_to_fly(arguments, of_plant=True)
+    hil = _hil_address(arguments, "udpout")
+    timing = _timing(arguments, AS_PX4_EXPECTS if hil.kind == "tcpin" else Timing("realtime", None))
     from sitl_bridge.plant.run import PlantOptions, run
 
     speaker = Speaker("plant", events=arguments.until_eof)
@@ -82,15 +108,15 @@ def _plant(arguments: argparse.Namespace) -> int:
     stop.install(watch_stdin=arguments.until_eof)
     options = PlantOptions(
         vehicle=vehicle,
-        hil=_hil_address(arguments, "udpout"),
-        clock=arguments.clock,
+        hil=hil,
+        clock=timing.clock,
         rate_hz=arguments.rate,
         seed=arguments.seed,
         instance=arguments.instance,
-        speed=arguments.speed,
+        speed=timing.speed,
         duration_s=arguments.duration or (scenario.duration if scenario else None),
         drop_percent=arguments.drop,
-        on_silence=arguments.on_silence,
+        on_silence=timing.on_silence,
         out=arguments.out,
         faults=_faults_of(scenario, vehicle),
         load_to=arguments.load_to,
@@ -139,8 +165,7 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.report import table, written
     from sitl.scenario import GroundControl, load_scenario
 
-    if arguments.speed is not None and arguments.clock != "lockstep":
-        raise DescriptionError("--speed", ["goes with --clock lockstep; real time runs at speed 1"])
+    timing = _timing(arguments, Timing("realtime", None))
     scenario = load_scenario(arguments.scenario)
     options = FlightOptions(
         scenario_name=arguments.scenario,
@@ -149,9 +174,9 @@ def _fly(arguments: argparse.Namespace) -> int:
         overrides=_overrides(arguments),
         plant_overrides=arguments.plant_set,
         hil=_hil_address(arguments, "udpout"),
-        clock=arguments.clock,
-        speed=arguments.speed,
-        on_silence=arguments.on_silence,
+        clock=timing.clock,
+        speed=timing.speed,
+        on_silence=timing.on_silence,
         rate_hz=arguments.rate,
         seed=arguments.seed,
         design=arguments.design,

@@ -60,7 +60,9 @@ class FlightOptions:
             common += ["--vehicle", self.vehicle]
         for override in self.overrides:
             common += ["--set", override]
-        plant = [*common, "--hil", str(self.hil), "--clock", self.clock, "--on-silence", self.on_silence]
+        plant = [*common, "--hil", str(self.hil), "--clock", self.clock]
+        if self.clock == "lockstep":
+            plant += ["--on-silence", self.on_silence]
         for override in self.plant_overrides:
             plant += ["--set", override]
         if self.speed is not None:

@@ -1,4 +1,4 @@
-"""A PX4 as its simulator sees it: connects, boots in silence, then answers every HIL_SENSOR.."""
+"""A PX4 as its simulator sees it: connects, boots in silence, then answers every HIL_SENSOR."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Plant:
     """`sitl plant` as its own process."""
 
     def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "sitl", "plant", "--clock", "lockstep", *arguments]
+        command = [sys.executable, "-m", "sitl", "plant", *arguments]
         self.popen = subprocess.Popen(command, stdin=subprocess.DEVNULL)
 
     def close(self) -> None:

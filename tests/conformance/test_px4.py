@@ -7,6 +7,7 @@ The vehicle heads east (yaw 0 in ENU), so that no two axes of world and body can
 from __future__ import annotations
 
 import socket
+import time
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
@@ -36,6 +37,7 @@ def attach(request: pytest.FixtureRequest) -> Iterator[Attach]:
         px4 = Px4(request.param)
         everything.append(px4)
         line = ("--vehicle", "iris", "--set", f"initial.start={start}", "--hil", px4.address)
+        line += ("--clock", "lockstep")
         everything.append(Plant(*line, *arguments))
         px4.connect()
         return px4
@@ -90,6 +92,25 @@ def test_freewheels_before_the_first_answer_and_freezes_after_it(attach: Attach,
     for k in range(3):  # one for one: nothing more until the next answer
         assert not px4.heard(0.05), k
         fly(px4, 1, armed=False)
+
+
+def test_whoever_waits_on_tcp_keeps_time_with_px4() -> None:
+    """`sitl plant --vehicle iris --hil tcpin:…` and no more: a tick for an answer, at a person's pace."""
+    px4 = Px4("tcp")
+    plant = Plant("--vehicle", "iris", "--hil", px4.address)
+    try:
+        px4.connect()
+        boot(px4)
+        px4.answer()
+        while px4.heard(0.3):
+            px4.tick()
+        began = time.monotonic()
+        fly(px4, 125, armed=False)
+        assert time.monotonic() - began > 0.45  # half a second of flight, at speed 1
+        assert not px4.heard(0.3)  # frozen until it is answered
+    finally:
+        plant.close()
+        px4.close()
 
 
 def test_at_rest_on_the_ground(attach: Attach) -> None:

@@ -125,6 +125,17 @@ def test_a_summary_is_json_whatever_happened(tmp_path: Path) -> None:
     assert summary == dict.fromkeys(PROMISED) | {"completed": False, "bound": [1.0, None], "settled": False}
 
 
+@pytest.mark.parametrize("flag", [("--speed", "2"), ("--on-silence", "continue")])
+@pytest.mark.parametrize("command", ["fly", "plant"])
+def test_what_only_lockstep_has_is_refused_in_real_time(
+    command: str, flag: tuple[str, str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main([command, *flag]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.splitlines()[0].startswith(flag[0])
+    assert "--clock lockstep" in complaint
+
+
 @pytest.mark.parametrize("command", ["bench", "paper --out unused", "plant", "controller", "fly hover"])
 def test_an_interrupt_while_it_starts_is_one_line(command: str) -> None:
     """Wherever it strikes, also where SIGINT was inherited as ignored: exit code 130 and no traceback."""
