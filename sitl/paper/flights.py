@@ -82,7 +82,6 @@ class Pilot:
     def __init__(self, folder: Path, stop: StopRequest) -> None:
         self._folder = folder
         self._stop = stop
-        self._ports: set[int] = set()
         self._pool = ThreadPoolExecutor(AT_ONCE)
         self._asked: dict[Request, Future[Flight]] = {}
 
@@ -95,8 +94,8 @@ class Pilot:
         """Make these flights when their turn comes; nobody waits for them yet."""
         for request in requests:
             if request not in self._asked:
-                out, port = self._folder / f"flight-{len(self._asked) + 1:02d}", self._free_port()
-                self._asked[request] = self._pool.submit(self._fly, request, out, port)
+                out = self._folder / f"flight-{len(self._asked) + 1:02d}"
+                self._asked[request] = self._pool.submit(self._fly, request, out)
 
     def fly(self, requests: Sequence[Request]) -> list[Flight]:
         """These flights, made; raises FlightError when one did not come to its end."""
@@ -107,9 +106,10 @@ class Pilot:
         """Give up what has not begun, and wait for what has."""
         self._pool.shutdown(cancel_futures=True)
 
-    def _fly(self, request: Request, out: Path, port: int) -> Flight:
+    def _fly(self, request: Request, out: Path) -> Flight:
         if self._stop:
             raise FlightError(f"stopped by {self._stop.reason}")
+        [port] = free_ports(1)
         description = load_scenario(request.scenario)
         out.mkdir(parents=True)
         options = FlightOptions(
@@ -150,11 +150,3 @@ class Pilot:
             rotors=np.stack([log[f"rotor_{i + 1}_rad_s"] for i in range(len(vehicle.rotors))], axis=1),
             force_on_load=np.stack([log[f"force_load_{axis}_N"] for axis in "xyz"], axis=1),
         )
-
-    def _free_port(self) -> int:
-        """A UDP port of 127.0.0.1 that is free now, and that no other flight of this run was given."""
-        while True:
-            [port] = free_ports(1)
-            if port not in self._ports:
-                self._ports.add(port)
-                return port
