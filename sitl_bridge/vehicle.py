@@ -136,6 +136,15 @@ class Battery(Section):
     figure_of_merit: float = quantity("-", "ideal over shaft power, of rotors", 0.6, gt=0, le=1)
     avionics_power: float = quantity("W", "drawn by everything but the rotors", 5.0, ge=0, le=1e4)
 
+    @model_validator(mode="after")
+    def _falls(self) -> Battery:
+        if self.empty_cell_voltage > self.full_cell_voltage:
+            raise ValueError(
+                f"empty_cell_voltage = {self.empty_cell_voltage:g} V is above "
+                f"full_cell_voltage = {self.full_cell_voltage:g} V; expected a pack whose voltage falls"
+            )
+        return self
+
 
 class Initial(Section):
     """Start state: hovering above the load at the equilibrium length, or both at rest on the ground.
@@ -237,6 +246,13 @@ class Vehicle(Section):
             raise ValueError("airframe.legs: on ground a vehicle needs three or more; expected points in m")
         if self.ground is None and self.initial.start == "ground":
             raise ValueError("initial.start = 'ground': there is no [ground] table")
+        if self.ground is not None and self.initial.start == "hover":
+            bodies = (self.initial.load_position, self.initial.vehicle_position or self.initial.load_position)
+            depth = self.ground.height - min(position[2] for position in bodies)
+            if depth > 0.0:
+                raise ValueError(
+                    f"initial: hovering begins {depth:.4g} m below ground.height; expected above"
+                )
         if self.initial.start == "ground" and self.initial_length > self.cable.rest_length:
             raise ValueError(
                 f"initial: the load lies {self.initial_length:.4g} m from the vehicle, "

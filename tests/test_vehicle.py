@@ -114,6 +114,20 @@ def test_rotors_that_give_no_yaw_are_refused() -> None:
     assert len(line) < 160
 
 
+@pytest.mark.parametrize(
+    ("overrides", "beginning"),
+    [
+        (("battery.empty_cell_voltage=5",), "battery: empty_cell_voltage = 5 V is above"),
+        (("initial.start=hover", "initial.load_position=[0,0,-0.5]"), "initial: hovering begins 0.5 m below"),
+        (("initial.start=hover", "ground.height=9"), "initial: hovering begins"),
+    ],
+)
+def test_values_that_exclude_each_other_get_one_line(overrides: tuple[str, ...], beginning: str) -> None:
+    (line,) = faults(*overrides, source="iris")
+    assert line.startswith(beginning)
+    assert "expected" in line
+
+
 def test_every_fault_gets_its_line() -> None:
     lines = faults("airframe.mass=0", "cable.stiffness=soft", "rotors.3.max_speed=-1", "load.weight=3")
     keys = ["airframe.mass", "rotors.3.max_speed", "cable.stiffness", "load.weight"]

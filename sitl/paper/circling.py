@@ -25,8 +25,6 @@ Array = NDArray[np.float64]
 
 PERIOD = 2.0 * math.pi
 """s"""
-RADIUS = 5.0
-"""m"""
 AGREEMENT = 0.05
 """Flown at 250 Hz against the paper's continuous gains in the second simulation, m."""
 LAGS = {"1": 75.0, "10": 109.0}
