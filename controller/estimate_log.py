@@ -6,12 +6,15 @@ Time is that of the plant's state log: 0 at the first armed tick.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller.estimator.filter import Estimator
 from controller.state import STATE_SIZE
 from sitl_bridge.rowlog import RowLog
+
+if TYPE_CHECKING:  # the names of the files are needed before anything is launched
+    from controller.estimator.filter import Estimator
 
 ESTIMATE_NAME = "estimate.parquet"
 COVARIANCE_NAME = "estimate_covariance.parquet"

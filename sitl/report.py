@@ -23,8 +23,10 @@ SUMMARY_NAME = "summary.json"
 PICTURE_NAME = "flight.png"
 FILES = (SUMMARY_NAME, FILE_NAME, TLOG_NAME, PICTURE_NAME, ESTIMATE_NAME, COVARIANCE_NAME)
 """Names of everything that a flight leaves in its folder."""
-OF_THE_PLANT = tuple(key for key in Account.__annotations__ if key not in ("completed", "stopped_by"))
-"""Keys of the plant's account that go into the summary as they are; the other two `sitl fly` knows better."""
+OF_THE_PLANT = tuple(
+    key for key in Account.__annotations__ if key not in ("completed", "failure", "stopped_by")
+)
+"""Keys of the plant's account that go into the summary as they are; the others `sitl fly` knows better."""
 PROMISED = (*OF_THE_PLANT, *Metrics.__annotations__, "estimate", "picture", "state_log_sha256")
 """Keys of every summary, however the flight ended: null for what is not known."""
 

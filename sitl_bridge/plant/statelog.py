@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH, columns, fill_row, kept_columns
-from sitl_bridge.plant.world import World
 from sitl_bridge.rowlog import RowLog
+
+if TYPE_CHECKING:  # the name of the file is needed before anything is launched
+    from sitl_bridge.plant.world import World
 
 FILE_NAME = "state.parquet"
 
