@@ -1,5 +1,8 @@
 """Settings of every test."""
 
+from typing import Any
+
+import pytest
 from hypothesis import settings
 
 # No deadline: a busy machine is no fault. The same examples each time: a failure is never the weather's;
@@ -7,3 +10,20 @@ from hypothesis import settings
 settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.register_profile("search", deadline=None, max_examples=1000)
 settings.load_profile("repeatable")
+
+LOOPBACK = "tests/loopback/"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With several workers (`-n 2`) one takes all that flies, which mostly waits; others compute meanwhile.
+
+    No test that flies in real time is ever beside its like, and what a module has set up is set up once.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFolder(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return LOOPBACK if nodeid.startswith(LOOPBACK) else nodeid.split("::")[0]
+
+    return ByFolder(config, log)
