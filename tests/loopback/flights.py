@@ -37,9 +37,19 @@ async def ready(vehicle: Vehicle) -> None:
     )
 
 
+async def version(vehicle: Vehicle) -> Any | None:
+    """What MAVSDK knows of the vehicle's version; None before AUTOPILOT_VERSION is there."""
+    from mavsdk.plugins.info import InfoError
+
+    try:
+        return await vehicle.info.get_version()
+    except InfoError:
+        return None
+
+
 async def information_and_parameters(vehicle: Vehicle) -> None:
     """Version, every parameter, set and refused."""
-    await until(vehicle.info.get_version, bool, "version")
+    await until(lambda: version(vehicle), bool, "version")
     every = await vehicle.param.get_all_params()
     assert {"COM_RC_IN_MODE", "SYS_AUTOSTART"} <= {p.name for p in every.int_params}
     assert "MIS_TAKEOFF_ALT" in {p.name for p in every.float_params}
