@@ -35,13 +35,19 @@ class Vehicle:
 
 
 @asynccontextmanager
-async def mavsdk_vehicle(connection: str, timeout: float = PATIENCE) -> AsyncIterator[Vehicle]:
-    """A vehicle on a MAVSDK connection string (`udpin://0.0.0.0:14540`)."""
+async def mavsdk_vehicle(
+    connection: str, timeout: float = PATIENCE, companion: bool = False
+) -> AsyncIterator[Vehicle]:
+    """A vehicle on a MAVSDK connection string (`udpin://0.0.0.0:14540`).
+
+    companion: MAVSDK as an onboard computer, which is no ground station to the vehicle.
+    """
     from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
     from mavsdk.logging import log_subscribe
 
     log_subscribe(lambda level, message, file, line: True)
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    kind = ComponentType.COMPANION_COMPUTER if companion else ComponentType.GROUND_STATION
+    configuration = Configuration.create_with_component_type(kind)
     async with Mavsdk(configuration) as mavsdk:
         await mavsdk.add_any_connection(connection)
         system = await mavsdk.first_autopilot(timeout_s=timeout)
@@ -61,6 +67,34 @@ async def until(
             return value
         await asyncio.sleep(0.1)
     raise AssertionError(f"{what}: not within {timeout:g} s; last {value}")
+
+
+class Texts:
+    """What a vehicle says to MAVSDK (STATUSTEXT), from the moment this is entered."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self.heard: list[str] = []
+        self._vehicle = vehicle
+
+    async def _listen(self) -> None:
+        async for status in self._vehicle.telemetry.subscribe_status_text():
+            self.heard.append(status.text)
+
+    async def __aenter__(self) -> Texts:
+        self._task = asyncio.create_task(self._listen())
+        await asyncio.sleep(0)  # subscribed
+        return self
+
+    async def __aexit__(self, *exception: object) -> None:
+        self._task.cancel()
+
+    async def wait_for(self, words: str, timeout: float = PATIENCE) -> None:
+        """Wait until it says something that it has not said before the last call; forgets what it has said."""
+        deadline = time.monotonic() + timeout
+        while not any(words in text for text in self.heard):
+            assert time.monotonic() < deadline, f"nobody said {words!r} within {timeout:g} s: {self.heard}"
+            await asyncio.sleep(0.05)
+        self.heard.clear()
 
 
 class MavProxy:
