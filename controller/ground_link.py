@@ -68,6 +68,10 @@ class GroundLink:
         profile = profile_of(vehicle, instance, has_ground=vehicle.ground is not None)
         self.station = Station(profile, time.monotonic(), storage, signing, peers)
         self._signing = signing
+        for (
+            notice
+        ) in self.station.machine.notices:  # of the parameter file; clients may attach too late for them
+            say(f"warning: {notice.text}")
         if options.exposed:
             guard = (
                 "to whoever has the signing key" if signing else "to ANYBODY on the network, without a key"

@@ -12,6 +12,8 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.parameter_file import ParameterFile
 from controller.ground.parameter_table import BY_NAME, TABLE, Parameter, markdown
+from controller.ground_link import GroundLink, GroundOptions, Ports
+from sitl_bridge.description import load_vehicle
 from tests.ground.rig import Channel, Client, Rig
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
@@ -225,6 +227,19 @@ def test_a_corrupt_file_is_survived_with_a_message(tmp_path: Path, content: str)
     assert rig.station.parameters["MIS_TAKEOFF_ALT"] == 2.5
     assert rig.station.parameters.integer("GF_ACTION") == 3
     assert len([text for text in client.texts() if "arameters" in text]) == 1
+
+
+def test_whoever_starts_a_controller_is_told_of_a_corrupt_file(tmp_path: Path) -> None:
+    """Not only ground stations, of which none may be there."""
+    path = tmp_path / "parameters.json"
+    path.write_text("{")
+    any_port = Ports(0, 9)
+    said: list[str] = []
+    GroundLink(
+        load_vehicle("iris"), 0, GroundOptions(any_port, any_port, parameters=path), said.append
+    ).close()
+    assert said[0].startswith("warning: Parameters: parameters.json: ")
+    assert said[0].endswith("defaults used, file kept as parameters.json.corrupt")
 
 
 def test_what_is_good_in_a_file_is_kept_and_what_is_not_is_named(tmp_path: Path) -> None:
