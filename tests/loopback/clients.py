@@ -89,7 +89,7 @@ class Texts:
         self._task.cancel()
 
     async def wait_for(self, words: str, timeout: float = PATIENCE) -> None:
-        """Wait until it says something that it has not said before the last call; forgets what it has said."""
+        """Wait until it says something that it had not said by the end of the last wait."""
         deadline = time.monotonic() + timeout
         while not any(words in text for text in self.heard):
             assert time.monotonic() < deadline, f"nobody said {words!r} within {timeout:g} s: {self.heard}"

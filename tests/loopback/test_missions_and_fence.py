@@ -1,4 +1,4 @@
-"""A mission paused, resumed, jumped about in, and not replaced by halves; then a fence that is flown through."""
+"""A mission paused, resumed, jumped about in, not replaced by halves; then a fence that is flown through."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ async def mission_and_fence(connection: str, client: PyMav) -> None:
 
 
 def test_a_mission_with_a_pause_and_a_jump_then_a_fence(tmp_path: Path) -> None:
-    # Twenty seconds on the ground are soon over at this speed.
+    # The seconds that an armed vehicle may wait on the ground are soon over at this speed.
     with flying_vehicle(tmp_path, BRISK, {"COM_DISARM_PRFLT": 120.0}) as vehicle:
         client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(mission_and_fence(vehicle.mavsdk, client))
