@@ -23,6 +23,7 @@ from controller.ground.parameter_table import TABLE
 from sitl.free_ports import free_ports
 from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
+from tests.loopback.by_hand import ByHand
 from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
 from tests.loopback.flights import ready, refused, take_off
@@ -226,32 +227,13 @@ def test_what_px4_gets_wrong_over_the_wire(tmp_path: Path) -> None:
         client.close()
 
 
-SCENARIO = ("--scenario", "hold", "--sensors", "rtk")
+RTK = ("--sensors", "rtk")
 """With a receiver that knows the height again after a restart, where a consumer's is metres off."""
-
-
-class ByHand:
-    """Plant and controller, each on its own."""
-
-    def __init__(self, start: Callable[..., Process]) -> None:
-        self.hil, self.gcs, self.gcs_peer, self.onboard, self.onboard_peer = free_ports(5)
-        self._start = start
-        plant = ("--hil", f"udpout:127.0.0.1:{self.hil}", "--clock", "lockstep", "--speed", "1")
-        self.plant = start("plant", *SCENARIO, *plant)
-        self.controller = self.start_controller()
-
-    def start_controller(self) -> Process:
-        """Start it, once more if it was there before."""
-        links = ("--gcs", f"{self.gcs}:{self.gcs_peer}", "--onboard", f"{self.onboard}:{self.onboard_peer}")
-        hil = ("--hil", f"udpin:127.0.0.1:{self.hil}")
-        self.controller = self._start("controller", *SCENARIO, *hil, *links)
-        self.controller.wait_for("plant connected")
-        return self.controller
 
 
 def test_a_stall_and_a_restart_of_the_controller_in_flight(start: Callable[..., Process]) -> None:
     """Taken off in QGroundControl's order, under offboard control: neither is the end of the flight."""
-    vehicle = ByHand(start)
+    vehicle = ByHand(start, RTK)
     client = PyMav(f"udpin:127.0.0.1:{vehicle.gcs_peer}")
     try:
         client.ready()
