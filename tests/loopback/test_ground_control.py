@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 import os
 import subprocess
@@ -117,7 +118,7 @@ def test_refusals_say_why(tmp_path: Path) -> None:
     assert "armed" not in vehicle.log.read_text()
 
 
-def test_new_weights_are_taken_in_flight(tmp_path: Path) -> None:
+def test_new_weights_are_taken_in_flight_and_kept(tmp_path: Path) -> None:
     async def to_height(connection: str) -> None:
         async with mavsdk_vehicle(connection) as vehicle:
             await take_off(vehicle, 5.0)
@@ -126,6 +127,16 @@ def test_new_weights_are_taken_in_flight(tmp_path: Path) -> None:
     with flying_vehicle(tmp_path, (*LOCKSTEP, "--feedback", "truth")) as vehicle:  # stillness is the law's
         client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(to_height(vehicle.mavsdk))
+        client.wait_for_text("New weights fly")
+        client.let_pass(2.0)
+        client.texts().clear()
+        keep, load_back = 1.0, 0.0
+        assert client.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, keep) == 0
+        assert json.loads(vehicle.log.with_name("parameters.json").read_text())["LQR_Q_LPOS"] == 4.0
+        client.set_parameter("LQR_Q_LPOS", 1.0)
+        client.wait_for_text("New weights fly")
+        client.texts().clear()
+        assert client.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, load_back) == 0
         client.wait_for_text("New weights fly")
         client.let_pass(2.0)
         client.close()
