@@ -112,7 +112,7 @@ class Guidance:
         """Home is here."""
         self.home, self._home_load = view.position, view.load_position
 
-    def set_home_below(self, view: VehicleView) -> None:
+    def _set_home_below(self, view: VehicleView) -> None:
         """Home is on the ground under a vehicle that was found in the air."""
         self.home = self._home_load = (view.position[0], view.position[1], self._profile.ground_height)
 
@@ -121,6 +121,8 @@ class Guidance:
         self.set_home(view)
         self.stage = Stage.GROUND if view.vehicle_on_ground else Stage.FLYING
         if self.stage is Stage.FLYING:
+            if self._profile.has_ground:
+                self._set_home_below(view)  # heights above home are above the ground
             self.hold_here(view)
 
     def end(self) -> None:

@@ -68,7 +68,7 @@ class Machine:
 
     @property
     def home(self) -> Triple | None:
-        """m ENU, where the vehicle stood when it was armed last; disarmed, where it is."""
+        """m ENU, where the vehicle was armed last, on the ground if it has one; disarmed, where it is."""
         return self._guidance.home
 
     @property
@@ -109,8 +109,6 @@ class Machine:
         """Take over a vehicle that is in the air (the controller was started again in flight), and hold."""
         self.view = view
         self._begin_flight(view, now)
-        if self.profile.has_ground:
-            self._guidance.set_home_below(view)  # where it was armed is not known
         self.say(WARNING, "Started in flight: holding")
 
     def _begin_flight(self, view: VehicleView, now: float) -> None:

@@ -60,6 +60,22 @@ def test_a_vehicle_without_ground_is_in_the_air_when_armed() -> None:
     assert client.command(192, -1, 1, 0, NAN, NAN, NAN, 487.0).result == ACCEPTED
 
 
+def test_armed_again_in_the_air_home_is_on_the_ground() -> None:
+    """Killed, and caught before it falls fast: heights above home are not above where that happened."""
+    rig, client = flying()
+    rig.frozen = True
+    rig.view.velocity = rig.view.load_velocity = (0.0, 0.0, 0.0)
+    above = rig.view.position[2]
+    assert client.command(400, 0, 21196).result == ACCEPTED
+    assert client.command(400, 1).result == ACCEPTED
+    rig.run(0.1)
+    assert isinstance(rig.target, Goto)  # it holds
+    x, y, _ = rig.view.position
+    assert rig.station.machine.home == (x, y, rig.station.profile.ground_height)
+    home_altitude = rig.station.machine.home_geodetic().altitude
+    assert client.command(192, -1, 1, 0, NAN, NAN, NAN, home_altitude + above).result == ACCEPTED
+
+
 def test_a_lost_load_leaves_the_vehicle_to_itself() -> None:
     rig, client = flying()
     rig.view.load_attached = False
