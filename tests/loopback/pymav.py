@@ -99,6 +99,14 @@ class PyMav:
         ack = self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, "ack", patience)
         return int(ack.result)
 
+    def command_int(self, number: int, *parameters: float, patience: float = PATIENCE) -> int:
+        """Send a COMMAND_INT with up to four parameters and no place; its result."""
+        values = [*parameters, *[math.nan] * (4 - len(parameters))]
+        relative = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        self.link.mav.command_int_send(1, 1, relative, number, 0, 0, *values, 0, 0, math.nan)
+        ack = self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, "ack", patience)
+        return int(ack.result)
+
     def ready(self) -> None:
         """Wait until the vehicle can be armed."""
         flag = mavlink.MAV_SYS_STATUS_PREARM_CHECK
