@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 import time
@@ -53,6 +54,24 @@ async def mavsdk_vehicle(
         system = await mavsdk.first_autopilot(timeout_s=timeout)
         assert system is not None, f"no autopilot on {connection} within {timeout:g} s"
         yield Vehicle(system)
+
+
+async def send_command(vehicle: Vehicle, number: int, *parameters: float) -> int:
+    """A COMMAND_LONG that MAVSDK has no method for; its result."""
+    from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
+    from mavsdk.plugins.mavlink_direct import MavlinkMessage
+
+    values = [*parameters, *[0.0] * (7 - len(parameters))]
+    fields = {
+        "target_system": 1,
+        "target_component": 1,
+        "command": number,
+        "confirmation": 0,
+        **{f"param{index}": value for index, value in enumerate(values, start=1)},
+    }
+    message = MavlinkMessage("COMMAND_LONG", 245, 190, 1, 1, json.dumps(fields))
+    ack = await MavlinkDirectAsync(vehicle.system).send_command(message)
+    return int(json.loads(ack.fields_json)["result"])
 
 
 async def until(

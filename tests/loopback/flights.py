@@ -20,6 +20,10 @@ from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
 from tests.loopback.patience import LONG_PATIENCE
 
 METRES_PER_DEGREE = 111_180.0
+BRISK = ("--clock", "lockstep", "--speed", "4")
+"""As fast as the machine can, up to four times, where no client's clock has to be the vehicle's"""
+WAITS_ARMED = {"COM_DISARM_PRFLT": 120.0}
+"""Its ten seconds of waiting for a take-off are soon over then."""
 
 
 async def refused(action: Callable[[], Awaitable[Any]], words: str) -> None:
@@ -188,6 +192,16 @@ def mavproxy_flight(master: str, folder: Path) -> None:
         at = proxy.wait_for("Mode LOITER", LONG_PATIENCE, after=at)
         proxy.say("long DO_SET_MODE 1 4 4")
         at = proxy.wait_for("Mission finished", LONG_PATIENCE, after=at)
+        proxy.say("wp set 9")
+        at = proxy.wait_for("Mission item 9 does not exist; there are 3", after=at)
+        proxy.say("wp set 1")
+        at = proxy.wait_for("waypoint 1", after=at)
+        proxy.say("wp clear")
+        at = proxy.wait_for("TYPE_MISSION: ACCEPTED", after=at)
+        proxy.say("wp list")
+        at = proxy.wait_for("Requesting 0 waypoints", after=at)
+        proxy.say("long MISSION_START")
+        at = proxy.wait_for("upload one first", after=at)
         proxy.say("disarm")
         at = proxy.wait_for("in flight; land first", after=at)
         proxy.say("long DO_SET_MODE 1 4 6")

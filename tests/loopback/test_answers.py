@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -12,11 +13,12 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from sitl.testing import SimulatedVehicle, flying_vehicle
-from tests.loopback.clients import mavsdk_vehicle, until
+from tests.loopback.clients import Vehicle, mavsdk_vehicle, send_command, until
 from tests.loopback.flights import refused
 from tests.loopback.pymav import PyMav
 
 NO_SUCH_COMMAND = 31999
+AVAILABLE_MODES = 435
 WRONG_TYPE = 7
 """MAV_PARAM_ERROR_TYPE_MISMATCH of the current dialect"""
 
@@ -87,6 +89,33 @@ def parameters_that_cannot_be(client: PyMav) -> None:
         client.wait_for_text(words)
 
 
+async def modes_there_are(vehicle: Vehicle) -> None:
+    """AVAILABLE_MODES, all of them asked for at once, which pymavlink's dialect does not know."""
+    from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
+
+    direct = MavlinkDirectAsync(vehicle.system)
+    modes: dict[int, dict[str, Any]] = {}
+
+    async def collect() -> None:
+        async for message in direct.subscribe_message("AVAILABLE_MODES"):
+            mode = json.loads(message.fields_json)
+            modes[mode["mode_index"]] = mode
+
+    collecting = asyncio.create_task(collect())
+    await asyncio.sleep(0)  # subscribed
+    asked = await send_command(vehicle, mavlink.MAV_CMD_REQUEST_MESSAGE, AVAILABLE_MODES)
+    assert asked == mavlink.MAV_RESULT_ACCEPTED
+
+    async def count() -> tuple[int, int]:
+        return len(modes), modes[1]["number_modes"] if 1 in modes else -1
+
+    await until(count, lambda seen: seen[0] == seen[1], "all available modes")
+    collecting.cancel()
+    by_name = {mode["mode_name"]: mode["custom_mode"] for mode in modes.values()}
+    for main, sub in ((4, 2), (4, 3), (4, 4), (4, 5), (4, 6), (6, 0)):
+        assert main << 16 | sub << 24 in by_name.values(), by_name
+
+
 async def rates_of_mavsdk(connection: str) -> None:
     async with mavsdk_vehicle(connection) as vehicle:
         # Streams that are off unless asked for.
@@ -96,7 +125,7 @@ async def rates_of_mavsdk(connection: str) -> None:
         imu = await anext(vehicle.telemetry.subscribe_imu())
         assert imu.acceleration_frd.down_m_s2 == pytest.approx(-9.81, abs=1.0)
         await refused(lambda: vehicle.telemetry.set_rate_distance_sensor(5.0), "DENIED|UNSUPPORTED")
-        await until(vehicle.info.get_identification, bool, "identification")
+        await modes_there_are(vehicle)
 
 
 def test_what_is_asked_over_udp_is_answered(tmp_path: Path) -> None:

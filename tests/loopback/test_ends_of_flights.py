@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from sitl.testing import flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Texts, Vehicle, mavsdk_vehicle, until
-from tests.loopback.flights import ready, refused, take_off
+from tests.loopback.flights import BRISK, WAITS_ARMED, ready, refused, take_off
 from tests.loopback.pymav import PyMav
 
 
@@ -58,8 +58,7 @@ async def two_ends(connection: str, watcher: PyMav) -> None:
 
 
 def test_a_kill_near_the_ground_and_a_termination_in_the_air(tmp_path: Path) -> None:
-    arguments = ("--clock", "lockstep", "--speed", "4")
-    with flying_vehicle(tmp_path, arguments, {"COM_DISARM_PRFLT": 120.0}) as vehicle:
+    with flying_vehicle(tmp_path, BRISK, WAITS_ARMED) as vehicle:
         watcher = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(two_ends(vehicle.mavsdk, watcher))
         watcher.close()

@@ -16,7 +16,7 @@ from pathlib import Path
 from tests.loopback.by_hand import ByHand
 from tests.loopback.clients import MavProxy, Texts, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
-from tests.loopback.flights import ready
+from tests.loopback.flights import WAITS_ARMED, ready
 from tests.loopback.patience import LONG_PATIENCE
 
 AWAY = 12.0
@@ -96,7 +96,7 @@ async def lose_everything(vehicle: ByHand, station: MavProxy) -> None:
 def test_everything_is_lost_one_after_the_other(start: Callable[..., Process], tmp_path: Path) -> None:
     stored = tmp_path / "parameters.json"
     # A busy machine's pauses are no loss before one is meant.
-    stored.write_text(json.dumps({"COM_HIL_LOSS_T": 10.0, "COM_DL_LOSS_T": 300.0, "COM_DISARM_PRFLT": 120.0}))
+    stored.write_text(json.dumps({"COM_HIL_LOSS_T": 10.0, "COM_DL_LOSS_T": 300.0, **WAITS_ARMED}))
     vehicle = ByHand(
         start,
         ("--set", "battery.charge=0.39"),  # under the highest threshold of an emergency

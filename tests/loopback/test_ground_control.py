@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Vehicle, mavsdk_vehicle, until
-from tests.loopback.flights import mavproxy_flight, mavsdk_flight, take_off
+from tests.loopback.flights import BRISK, WAITS_ARMED, mavproxy_flight, mavsdk_flight, take_off
 from tests.loopback.patience import PATIENCE
 from tests.loopback.pymav import PyMav
 
@@ -46,7 +46,7 @@ def test_mavsdk_flies_everything(tmp_path: Path) -> None:
 
 
 def test_mavproxy_flies_a_mission_and_lands(tmp_path: Path) -> None:
-    with flying_vehicle(tmp_path / "vehicle") as vehicle:
+    with flying_vehicle(tmp_path / "vehicle", BRISK, WAITS_ARMED) as vehicle:
         mavproxy_flight(vehicle.mavproxy.replace("udpin", "udp"), tmp_path)
     assert_landed(vehicle)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -11,28 +10,15 @@ from pathlib import Path
 from pymavlink.dialects.v20 import common as mavlink
 
 from sitl.free_ports import free_ports
-from tests.loopback.clients import Vehicle, mavsdk_vehicle
+from tests.loopback.clients import Vehicle, mavsdk_vehicle, send_command
 from tests.loopback.conftest import Process
 
-LOAD, SAVE = 0, 1
+LOAD, SAVE = 0.0, 1.0
 
 
-async def storage(vehicle: Vehicle, action: int) -> int:
-    """PREFLIGHT_STORAGE, of which MAVSDK has no method of its own; the result."""
-    from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
-    from mavsdk.plugins.mavlink_direct import MavlinkMessage
-
-    fields = {
-        "target_system": 1,
-        "target_component": 1,
-        "command": mavlink.MAV_CMD_PREFLIGHT_STORAGE,
-        "confirmation": 0,
-        **{f"param{number}": 0.0 for number in range(2, 8)},
-        "param1": float(action),
-    }
-    message = MavlinkMessage("COMMAND_LONG", 245, 190, 1, 1, json.dumps(fields))
-    ack = await MavlinkDirectAsync(vehicle.system).send_command(message)
-    return int(json.loads(ack.fields_json)["result"])
+async def storage(vehicle: Vehicle, action: float) -> int:
+    """The result of PREFLIGHT_STORAGE."""
+    return await send_command(vehicle, mavlink.MAV_CMD_PREFLIGHT_STORAGE, action)
 
 
 async def change_and_keep(connection: str) -> None:

@@ -13,12 +13,10 @@ from pymavlink.dialects.v20 import common as mavlink
 from sitl.testing import flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Texts, Vehicle, mavsdk_vehicle, until
-from tests.loopback.flights import METRES_PER_DEGREE, ready, refused
+from tests.loopback.flights import BRISK, METRES_PER_DEGREE, WAITS_ARMED, ready, refused
 from tests.loopback.patience import LONG_PATIENCE
 from tests.loopback.pymav import PyMav
 
-BRISK = ("--clock", "lockstep", "--speed", "4")
-"""Nobody in this flight depends on the vehicle's clock being everybody's."""
 PLACES = ((5.0, 0.0), (5.0, 60.0), (-60.0, 60.0), (0.0, 6.0))
 """m north and east of home; the second so far away that it is never reached before the jump to the last"""
 FENCE = 15.0
@@ -196,8 +194,7 @@ async def mission_and_fence(connection: str, client: PyMav) -> None:
 
 
 def test_a_mission_with_a_pause_and_a_jump_then_a_fence(tmp_path: Path) -> None:
-    # The seconds that an armed vehicle may wait on the ground are soon over at this speed.
-    with flying_vehicle(tmp_path, BRISK, {"COM_DISARM_PRFLT": 120.0}) as vehicle:
+    with flying_vehicle(tmp_path, BRISK, WAITS_ARMED) as vehicle:
         client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(mission_and_fence(vehicle.mavsdk, client))
         client.close()
