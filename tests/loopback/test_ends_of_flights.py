@@ -17,6 +17,9 @@ from tests.loopback.pymav import PyMav
 
 async def kill_just_above_the_ground(vehicle: Vehicle, texts: Texts) -> None:
     await ready(vehicle)
+    await vehicle.param.set_param_float(
+        "MPC_TKO_SPEED", 0.3
+    )  # still low when it is seen to be off the ground
     ground = (await vehicle.telemetry.position()).relative_altitude_m
     await vehicle.action.arm()
     await vehicle.action.takeoff()
@@ -25,6 +28,7 @@ async def kill_just_above_the_ground(vehicle: Vehicle, texts: Texts) -> None:
     await texts.wait_for("Disarmed by force: rotors stopped")
     await until(vehicle.telemetry.armed, lambda armed: not armed, "disarmed")
     await until(vehicle.telemetry.landed_state, lambda s: s.name == "ON_GROUND", "fallen")
+    await vehicle.param.set_param_float("MPC_TKO_SPEED", 1.0)
 
 
 async def terminate_in_the_air(vehicle: Vehicle, texts: Texts) -> None:

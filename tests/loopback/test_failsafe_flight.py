@@ -70,7 +70,7 @@ async def lose_everything(vehicle: ByHand, station: MavProxy) -> None:
 
         # Offboard set-points lost: hold.
         await fly_offboard_and_vanish(f"udpout://127.0.0.1:{vehicle.onboard}")
-        await texts.wait_for("No offboard set-point for 1 s: holding")
+        await texts.wait_for("No offboard set-point for 3 s: holding")
         await in_mode(watcher, "HOLD")
 
         # The plant lost and back: hold.
@@ -96,7 +96,9 @@ async def lose_everything(vehicle: ByHand, station: MavProxy) -> None:
 def test_everything_is_lost_one_after_the_other(start: Callable[..., Process], tmp_path: Path) -> None:
     stored = tmp_path / "parameters.json"
     # A busy machine's pauses are no loss before one is meant.
-    stored.write_text(json.dumps({"COM_HIL_LOSS_T": 10.0, "COM_DL_LOSS_T": 300.0, **WAITS_ARMED}))
+    stored.write_text(
+        json.dumps({"COM_HIL_LOSS_T": 10.0, "COM_DL_LOSS_T": 300.0, "COM_OF_LOSS_T": 3.0, **WAITS_ARMED})
+    )
     vehicle = ByHand(
         start,
         ("--set", "battery.charge=0.39"),  # under the highest threshold of an emergency

@@ -194,7 +194,8 @@ async def mission_and_fence(connection: str, client: PyMav) -> None:
 
 
 def test_a_mission_with_a_pause_and_a_jump_then_a_fence(tmp_path: Path) -> None:
-    with flying_vehicle(tmp_path, BRISK, WAITS_ARMED) as vehicle:
+    patient = WAITS_ARMED | {"COM_OF_LOSS_T": 20.0}  # a busy client is no lost one
+    with flying_vehicle(tmp_path, BRISK, patient) as vehicle:
         client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(mission_and_fence(vehicle.mavsdk, client))
         client.close()
