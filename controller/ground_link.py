@@ -68,9 +68,8 @@ class GroundLink:
         profile = profile_of(vehicle, instance, has_ground=vehicle.ground is not None)
         self.station = Station(profile, time.monotonic(), storage, signing, peers)
         self._signing = signing
-        for (
-            notice
-        ) in self.station.machine.notices:  # of the parameter file; clients may attach too late for them
+        # Of the parameter file; clients may attach too late for them.
+        for notice in self.station.machine.notices:
             say(f"warning: {notice.text}")
         if options.exposed:
             guard = (
