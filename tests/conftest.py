@@ -11,19 +11,19 @@ settings.register_profile("repeatable", deadline=None, derandomize=True, max_exa
 settings.register_profile("search", deadline=None, max_examples=1000)
 settings.load_profile("repeatable")
 
-LOOPBACK = "tests/loopback/"
+STATIONS = "tests/loopback/stations/"
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With several workers (`-n 2`) one takes all that flies, which mostly waits; others compute meanwhile.
+    """With several workers (`-n 2`) one flies with ground stations, which mostly wait; the others compute.
 
-    No test that flies in real time is ever beside its like, and what a module has set up is set up once.
+    No two flights with stations are ever under way together, and what a module has set up is set up once.
     """
     from xdist.scheduler import LoadScopeScheduling
 
     class ByFolder(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return LOOPBACK if nodeid.startswith(LOOPBACK) else nodeid.split("::")[0]
+            return STATIONS if nodeid.startswith(STATIONS) else nodeid.split("::")[0]
 
     return ByFolder(config, log)

@@ -23,7 +23,7 @@ from tests.loopback.flights import BRISK, WAITS_ARMED, mavproxy_flight, mavsdk_f
 from tests.loopback.patience import PATIENCE
 from tests.loopback.pymav import PyMav
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 LOCKSTEP = ("--clock", "lockstep", "--speed", "1")
 LANDED = 0.15
 """m, height of an iris that stands on its legs, and some"""
