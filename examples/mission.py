@@ -20,9 +20,9 @@ async def main(connection: str) -> None:
         if system is None:
             sys.exit(f"no vehicle on {connection}: start one with `sitl fly hold`")
         action, mission, telemetry = ActionAsync(system), MissionAsync(system), TelemetryAsync(system)
-        while not (await telemetry.health()).is_armable:
+        while not ((health := await telemetry.health()).is_armable and health.is_home_position_ok):
             await asyncio.sleep(0.2)
-        home = await telemetry.position()
+        home = await telemetry.home()
         plan = MissionPlan(
             [
                 MissionItem(

@@ -33,12 +33,13 @@ async def refused(action: Callable[[], Awaitable[Any]], words: str) -> None:
 
 
 async def ready(vehicle: Vehicle) -> None:
-    """Wait until the vehicle says that it can be armed."""
+    """Wait until the vehicle says that it can be armed, and where it is (MAVSDK has NaN until then)."""
     await until(
         vehicle.telemetry.health,
         lambda h: h.is_armable and h.is_global_position_ok and h.is_home_position_ok,
         "armable",
     )
+    await until(vehicle.telemetry.position, lambda p: math.isfinite(p.latitude_deg), "position")
 
 
 async def version(vehicle: Vehicle) -> Any | None:
