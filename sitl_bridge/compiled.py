@@ -27,6 +27,7 @@ import hashlib
 import importlib
 import json
 import os
+import signal
 import stat
 import struct
 import subprocess
@@ -54,6 +55,7 @@ _LIBM = {
     for suffix in ("", "f")
 }
 _MEMORY = {"memcpy", "memset", "memmove"}
+INTERRUPTED = {-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP}
 # Other packages whose contents end up in machine code: the compiler's, and constants of the dialect.
 _FOREIGN = ("numba._version", "pymavlink.dialects.v20.common")
 
@@ -333,6 +335,10 @@ def _compile(module: str) -> bytes:
     outcome = subprocess.run(
         command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, check=False
     )
+    if outcome.returncode in INTERRUPTED:
+        raise KeyboardInterrupt  # whoever stopped that meant this process as well
+    if outcome.returncode < 0:
+        raise RuntimeError(f"compiling {module} was killed by {signal.Signals(-outcome.returncode).name}")
     if outcome.returncode != 0:
         raise RuntimeError(f"compiling {module} failed:\n{outcome.stderr.decode(errors='replace')}")
     return outcome.stdout

@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import signal
 import struct
 import subprocess
 import sys
@@ -310,6 +311,28 @@ def test_refused(
         compiled._cached_object(name)
     assert f"compiling {name} failed" in str(caught.value)
     assert not list(cache.glob(f"{name}*"))
+
+
+@pytest.mark.parametrize(
+    ("number", "error", "message"),
+    [
+        (signal.SIGTERM, KeyboardInterrupt, "^$"),  # to a whole group of processes, as by `timeout`
+        (signal.SIGKILL, RuntimeError, "compiling native_killed was killed by SIGKILL"),
+    ],
+)
+def test_a_compilation_that_is_ended_is_no_failure_of_the_code(
+    number: signal.Signals,
+    error: type[BaseException],
+    message: str,
+    cache: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "native_killed.py").write_text(f"import os\nos.kill(os.getpid(), {int(number)})\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(error, match=message):
+        compiled._cached_object("native_killed")
+    assert not list(cache.glob("native_killed*"))
 
 
 def test_bind_refuses_other_arrays(cache: Path) -> None:
