@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import annotated_types
@@ -25,6 +26,15 @@ def _shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+def _leaves(where: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """The keys of a table and of the tables in it, with their values; a key of its own for what is none."""
+    if isinstance(value, dict) and value:
+        for key, entry in value.items():
+            yield from _leaves(f"{where}.{key}", entry)
+    else:
+        yield where, value
+
+
 def fault_line(model: type[BaseModel], fault: Any) -> str:
     """One line for one fault: key, value, unit, allowed range."""
     where = ".".join(str(part) for part in fault["loc"])
@@ -34,7 +44,9 @@ def fault_line(model: type[BaseModel], fault: Any) -> str:
     if fault["type"] == "missing":
         return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
     if fault["type"] == "extra_forbidden":
-        return f"{where} = {_shown(fault['input'])}: no such key"
+        return "; ".join(
+            f"{key} = {_shown(value)}: no such key" for key, value in _leaves(where, fault["input"])
+        )
     if fault["type"] == "value_error":
         return f"{where}: {problem}" if where else problem
     of_list = isinstance(fault["loc"][-1], int)

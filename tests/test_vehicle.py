@@ -90,7 +90,7 @@ def test_file_by_path_reads_as_the_shipped_one(tmp_path: Path, paper: Vehicle) -
         ('cable.rest_length="10"', ["cable.rest_length = '10' m", "number"]),
         (f"cable.rest_length={'9' * 5000}", ["cable.rest_length = '99", "... m", "<= 1000"]),
         ("cable.length=3", ["cable.length = 3", "no such key"]),
-        ("cabel.rest_length=3", ["cabel = {'rest_length': 3}", "no such key"]),
+        ("cabel.rest_length=3", ["cabel.rest_length = 3", "no such key"]),
         ("loop.delay_ticks=1.5", ["loop.delay_ticks = 1.5 ticks", "integer", ">= 0 and <= 64"]),
         ("disturbance.force_std=-5", ["disturbance.force_std = -5 N", ">= 0 and <= 10000"]),
         ("home.latitude=90", ["home.latitude = 90 deg", ">= -89 and <= 89"]),
