@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any, NoReturn
 
 from controller.design_names import DESIGNS
 from controller.ground.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
@@ -14,9 +15,23 @@ from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 DEFAULT_RATE_HZ = 250.0
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, and where there is more; the usage of a command is long."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (`{self.prog} --help` shows what there is)\n")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """A command has no unknown arguments that another parser could know."""
+        known, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return known, unknown
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The whole command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="sitl",
         description="A quadrotor with a load on an elastic cable, simulated by one process (the plant) and "
         "flown by another (the controller) over standard MAVLink on UDP.",

@@ -240,6 +240,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return EXIT_USAGE
     except OSError as error:
-        print(f"sitl {arguments.command}: {error}", file=sys.stderr)
+        what = f"{error.filename}: {error.strerror}" if error.filename else error
+        print(f"sitl {arguments.command}: {what}", file=sys.stderr)
         return EXIT_USAGE
     return code
