@@ -16,7 +16,7 @@ from sitl.fly import Pair, ProgressLine, watch
 from sitl.report import OF_THE_PLANT, clear, write_report
 from sitl.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
 from sitl_bridge.description import Override
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults import checked
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle import Vehicle
@@ -72,13 +72,28 @@ class FlightOptions:
         plant += ["--drop", repr(self.drop_percent)]
         if self.out is not None:
             plant += ["--out", str(self.out)]
-        other_end = self.hil._replace(kind=MIRRORED[self.hil.kind])
-        controller = [*common, "--hil", str(other_end), "--design", self.design]
+        controller = [*common, "--hil", str(self.other_end), "--design", self.design]
         if self.feedback is not None:
             controller += ["--feedback", self.feedback]
         if self.out is not None:
             controller += ["--out", str(self.out)]
         return plant, [*controller, *self.ground]
+
+    @property
+    def other_end(self) -> Address:
+        """The controller's end of the link."""
+        return self.hil._replace(kind=MIRRORED[self.hil.kind])
+
+    def check_port(self) -> None:
+        """Raises OSError, before anything is launched, when somebody has the port of the end that waits.
+
+        A plant would else fly with whoever that is.
+        """
+        waiting = self.hil if self.hil.kind.endswith("in") else self.other_end
+        try:
+            open_link(waiting, lambda text: None).close()
+        except OSError as error:
+            raise OSError(f"{error}; --instance N flies beside others, --hil on another port") from None
 
     def checked_vehicle(self) -> Vehicle:
         """The vehicle as the controller is told, once it is sure that the processes take what they are given.
@@ -105,6 +120,7 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     """Fly; returns the summary and the output folder, where it is too. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = options.checked_vehicle()
+    options.check_port()
     if options.out is None:
         name = f"{Path(options.scenario_name).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
         options = replace(options, out=new_folder(Path("runs") / name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import selectors
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import IO, Any
 
-from sitl_bridge.process import StopRequest
+from sitl_bridge.process import FLIGHT_OVER, StopRequest
 
 PATIENCE = 10.0
 """How long a process may take to stop before it is killed, s."""
@@ -84,6 +85,18 @@ class Pair:
         """The name of a process that has ended, if one has."""
         return next((name for name, child in self.processes.items() if child.poll() is not None), None)
 
+    def finish(self) -> None:
+        """The flight is over: let them end by themselves, for a while."""
+        for child in self.processes.values():
+            assert child.stdin is not None
+            with contextlib.suppress(OSError):  # gone already
+                child.stdin.write(FLIGHT_OVER)
+                child.stdin.flush()
+        deadline = time.monotonic() + PATIENCE
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            for child in self.processes.values():
+                child.wait(max(0.0, deadline - time.monotonic()))
+
     def stop(self) -> None:
         """Ask both to stop, wait, and kill what does not."""
         for child in self.processes.values():
@@ -131,6 +144,8 @@ def watch(pair: Pair, stop: StopRequest, show: Any) -> Outcome:
                     ending = how_it_ended(pair.processes[name])
                     outcome.failure = f"the {name} {ending}; the {others} was stopped"
                     break
+            if outcome.end and not stop:
+                pair.finish()
         finally:
             pair.stop()
             _events(plant.stdout, buffer, outcome, pair, show)

@@ -38,6 +38,7 @@ def check_design(design: str) -> None:
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     """Run both processes until asked to stop; returns what went wrong before that, if something did."""
     options.checked_vehicle()
+    options.check_port()
     if options.out is not None:
         clear(options.out)
     line = ProgressLine(sys.stderr)

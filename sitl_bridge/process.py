@@ -9,9 +9,12 @@ import sys
 import threading
 from typing import Any
 
+FLIGHT_OVER = b"over\n"
+"""What a parent writes to a child's standard input when there is nothing more to do."""
+
 
 class StopRequest:
-    """Set by SIGINT, SIGTERM or SIGHUP (also where a shell had them ignored), or when standard input ends."""
+    """Set by SIGINT, SIGTERM or SIGHUP (also where a shell had them ignored), or through standard input."""
 
     def __init__(self) -> None:
         self.reason: str | None = None
@@ -20,7 +23,7 @@ class StopRequest:
         return self.reason is not None
 
     def install(self, watch_stdin: bool = False) -> None:
-        """Take over the signals; with watch_stdin, stop too when whoever holds our standard input is gone."""
+        """Take over the signals; with watch_stdin, stop too when our standard input says so, or has ended."""
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         if watch_stdin:
@@ -30,9 +33,8 @@ class StopRequest:
         self.reason = signal.Signals(number).name
 
     def _watch_stdin(self) -> None:
-        while os.read(sys.stdin.fileno(), 4096):
-            pass
-        self.reason = "end of standard input"
+        said = os.read(sys.stdin.fileno(), len(FLIGHT_OVER))
+        self.reason = "the end of the flight" if said == FLIGHT_OVER else "end of standard input"
 
 
 class Speaker:
