@@ -8,21 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from controller.autopilot import Autopilot
-from controller.awake import AwakeClock
-from controller.design_names import ON_ESTIMATE
-from controller.feedback import Feedback, PathFrom, estimates
+from controller.design.names import ON_ESTIMATE
+from controller.feedback.truth import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, new_session
+from controller.pilot.autopilot import Autopilot
+from controller.pilot.stall_clock import AwakeClock
 from sitl_bridge.mavlink.links import Address, Link, open_link
-from sitl_bridge.mavlink.loss import LossyLink
+from sitl_bridge.mavlink.lossy_link import LossyLink
 from sitl_bridge.process import Speaker, StopRequest
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
-    from controller.assessment import Assessor
-    from controller.estimate_log import EstimateLog
-    from controller.ground_link import GroundOptions
-    from controller.guided_run import Guided
+    from controller.feedback.assessment import Assessor
+    from controller.feedback.log import EstimateLog
+    from controller.pilot.ground_link import GroundOptions
+    from controller.pilot.ground_session import Guided
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         log, feedback = _estimating_beside(options)
     guided: Guided | None = None
     if options.path_from is None:
-        from controller.guided_run import Guided
+        from controller.pilot.ground_session import Guided
 
         guided = Guided(
             options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say, assessor
@@ -104,9 +104,9 @@ def _estimating(
     options: ControllerOptions, speaker: Speaker
 ) -> tuple[EstimateLog | None, Feedback, Assessor]:
     """The estimator, its log and what judges it; imported only where they are flown on."""
-    from controller.estimate_feedback import EstimateFeedback
-    from controller.estimate_health import EstimateAssessor
-    from controller.estimate_log import EstimateLog
+    from controller.feedback.estimate import EstimateFeedback
+    from controller.feedback.health import EstimateAssessor
+    from controller.feedback.log import EstimateLog
 
     log = None if options.out is None else EstimateLog(options.out)
     alone = options.path_from is not None
@@ -116,8 +116,8 @@ def _estimating(
 
 def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedback]:
     """The estimator beside the truth, and its log."""
-    from controller.estimate_feedback import EstimateFeedback, TruthBesideEstimate
-    from controller.estimate_log import EstimateLog
+    from controller.feedback.estimate import EstimateFeedback, TruthBesideEstimate
+    from controller.feedback.log import EstimateLog
 
     assert options.out is not None
     log = EstimateLog(options.out)

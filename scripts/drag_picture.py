@@ -14,7 +14,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from sitl_bridge.plant.state import LOAD_GROUND_FORCE, TENSION  # noqa: E402
+from sitl_bridge.plant.physics.state import LOAD_GROUND_FORCE, TENSION  # noqa: E402
 from tests.plant.test_ground_flight import PERIOD, flown  # noqa: E402
 
 

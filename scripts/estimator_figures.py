@@ -14,8 +14,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from controller.estimator.weights import estimated_weights
-from sitl_bridge.description import load_vehicle
+from controller.design.estimated_weights import estimated_weights
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.flights import Flight, Sample, fly
 
 

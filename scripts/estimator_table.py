@@ -19,7 +19,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
-from sitl.free_ports import free_ports  # noqa: E402
+from sitl.flights.free_ports import free_ports  # noqa: E402
 
 INDEPENDENT_TIME = 10.0
 """s after which errors are taken as independent, for the bounds of NEES."""

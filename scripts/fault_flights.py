@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from controller.autopilot import Autopilot  # noqa: E402
-from controller.design_names import ON_ESTIMATE  # noqa: E402
-from controller.estimate_feedback import EstimateFeedback  # noqa: E402
+from controller.design.names import ON_ESTIMATE  # noqa: E402
+from controller.feedback.estimate import EstimateFeedback  # noqa: E402
 from controller.hil.session import new_session  # noqa: E402
-from controller.reference import setpoint  # noqa: E402
-from sitl_bridge.description import load_vehicle, validated  # noqa: E402
-from sitl_bridge.plant.faults import Faults, SensorFault  # noqa: E402
-from sitl_bridge.plant.link_faults import FaultyPath  # noqa: E402
-from sitl_bridge.plant.notices import Notices  # noqa: E402
-from sitl_bridge.plant.realtime import Realtime  # noqa: E402
+from controller.law.reference import setpoint  # noqa: E402
+from controller.pilot.autopilot import Autopilot  # noqa: E402
+from sitl_bridge.plant.clocks.realtime import Realtime  # noqa: E402
+from sitl_bridge.plant.faults.impairments import FaultyPath  # noqa: E402
+from sitl_bridge.plant.faults.schedule import Faults, SensorFault  # noqa: E402
+from sitl_bridge.plant.log.notices import Notices  # noqa: E402
 from sitl_bridge.plant.simulation import Simulation  # noqa: E402
+from sitl_bridge.vehicle.files import load_vehicle, validated  # noqa: E402
 
 RATE = 250.0
 AT, END = 5.0, 20.0

@@ -2,6 +2,6 @@
 
 import sys
 
-from sitl.start import main
+from sitl.entry import main
 
 sys.exit(main())

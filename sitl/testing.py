@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.free_ports import free_ports
+from sitl.flights.free_ports import free_ports
 
 START_PATIENCE = 120.0
 """s; the first start on a machine compiles"""

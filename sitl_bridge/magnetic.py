@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sitl_bridge.frames import Triple
-from sitl_bridge.vehicle import Home
+from sitl_bridge.vehicle.description import Home
 
 MODEL = "wmm/WMM_2025.COF"
 EPOCH = 2026.5

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sitl_bridge.description import DescriptionError, load_vehicle, vehicle_names
-from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speed
+from sitl_bridge.vehicle.files import DescriptionError, load_vehicle, vehicle_names
 
 
 def faults(*overrides: str, source: str = "paper") -> list[str]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from controller.estimator.layout import (
+from controller.estimator.correct.update import set_part
+from controller.estimator.records import (
     ATTITUDE,
     BARO_OFFSET,
     ERROR_SIZE,
@@ -34,7 +35,6 @@ from controller.estimator.layout import (
     X_VELOCITY,
     Filter,
 )
-from controller.estimator.update import set_part
 from sitl_bridge.compiled import kernel
 
 IN_FLIGHT_TILT_STD = 0.15

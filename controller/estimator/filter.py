@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.estimator import intake, step
-from controller.estimator.layout import (
+from controller.estimator.records import (
     ALIGNING,
     ERROR_SIZE,
     FILTER,
@@ -28,7 +28,7 @@ from controller.estimator.layout import (
     Array,
 )
 from controller.estimator.tuning import Tuning, parameters
-from sitl_bridge.vehicle import Vehicle, hover_rotor_speeds
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 
 Sequence3 = tuple[float, float, float] | Array
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from controller.estimator.layout import INPUT
+from controller.estimator.records import INPUT
 from controller.hil.ticks import SENSED
 from sitl_bridge.compiled import Buffer, entry_point
 

@@ -8,8 +8,19 @@ from typing import Any
 import numpy as np
 
 from controller.estimator.alignment import align, start_hanging
-from controller.estimator.delayed import OUTAGE, gps, remember, tracker
-from controller.estimator.layout import (
+from controller.estimator.contact_modes import leave_ground, lose_track, release, stand, watch
+from controller.estimator.correct.delayed import OUTAGE, gps, remember, tracker
+from controller.estimator.correct.sensors import (
+    accelerometer,
+    barometer,
+    gyroscope,
+    load_at_rest,
+    magnetometer,
+    on_ground,
+    rest,
+)
+from controller.estimator.predict.process import predict
+from controller.estimator.records import (
     ALIGNING,
     BODY_RATES_OUT,
     CLONE_LOAD,
@@ -39,17 +50,6 @@ from controller.estimator.layout import (
     Array,
     Filter,
 )
-from controller.estimator.process import predict
-from controller.estimator.sensors import (
-    accelerometer,
-    barometer,
-    gyroscope,
-    load_at_rest,
-    magnetometer,
-    on_ground,
-    rest,
-)
-from controller.estimator.transitions import leave_ground, lose_track, release, stand, watch
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 MOST_MISSED_TICKS = 50

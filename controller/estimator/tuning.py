@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from controller.estimator.layout import (
+from controller.estimator.records import (
     ACCELEROMETER,
     BAROMETER,
     ERROR_SIZE,
@@ -22,7 +22,7 @@ from controller.estimator.layout import (
     TRACKER,
 )
 from sitl_bridge.frames import STANDARD_GRAVITY
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
 
 Triple = tuple[float, float, float]
 

@@ -7,17 +7,17 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground import missions as mission_protocol
-from controller.ground import telemetry
-from controller.ground.command_service import CommandService
-from controller.ground.missions import Client, Missions
-from controller.ground.modes import Machine
-from controller.ground.outbox import Outbox
-from controller.ground.parameters import Parameters
-from controller.ground.peers import Peer, Peers
-from controller.ground.setpoints import setpoint_of
-from controller.ground.verdict import WARNING, Notice
-from controller.ground.wire import Packed
+from controller.ground.commands.result import WARNING, Notice
+from controller.ground.commands.service import CommandService
+from controller.ground.commands.setpoints import setpoint_of
+from controller.ground.flight.modes import Machine
+from controller.ground.link.outbox import Outbox
+from controller.ground.link.packing import Packed
+from controller.ground.link.peers import Peer, Peers
+from controller.ground.missions import transfer as mission_protocol
+from controller.ground.missions.transfer import Client, Missions
+from controller.ground.parameters.protocol import Parameters
+from controller.ground.telemetry import messages as telemetry
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
 

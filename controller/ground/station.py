@@ -10,25 +10,25 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground import telemetry
-from controller.ground.command_service import CommandService
-from controller.ground.guidance import Stage
+from controller.ground.commands.result import WARNING, Notice
+from controller.ground.commands.service import CommandService
+from controller.ground.flight.guidance import Stage
+from controller.ground.flight.modes import Machine
+from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.setpoint_types import Target
 from controller.ground.inbox import Inbox
-from controller.ground.load_relay import LoadRelay
-from controller.ground.missions import Missions
-from controller.ground.modes import Machine
-from controller.ground.outbox import Outbox
-from controller.ground.parameter_file import ParameterFile
-from controller.ground.parameters import Parameters
-from controller.ground.peers import Address, Peers
-from controller.ground.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
-from controller.ground.px4_modes import Mode
-from controller.ground.signing import Signing
-from controller.ground.stored_parameters import StoredParameters
-from controller.ground.targets import Target
-from controller.ground.verdict import WARNING, Notice
-from controller.ground.view import Profile, VehicleView
-from controller.ground.wire import CurrentMode, Packed, decoded, packed
+from controller.ground.link.outbox import Outbox
+from controller.ground.link.packing import CurrentMode, Packed, decoded, packed
+from controller.ground.link.peers import Address, Peers
+from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
+from controller.ground.link.signing import Signing
+from controller.ground.missions.transfer import Missions
+from controller.ground.parameters.file import ParameterFile
+from controller.ground.parameters.protocol import Parameters
+from controller.ground.parameters.storage import StoredParameters
+from controller.ground.telemetry import messages as telemetry
+from controller.ground.telemetry.load_relay import LoadRelay
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame, split
 
 STATION_LINK, ONBOARD_LINK = 0, 1

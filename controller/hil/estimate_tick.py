@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from controller import step
-from controller.allocation import MOST_ROTORS
 from controller.estimator import intake
 from controller.estimator import step as estimator
 from controller.estimator.step import ESTIMATOR_BUFFERS
 from controller.hil import answers, ticks
 from controller.hil.answers import CONTROLS, WRITE_BUFFERS
 from controller.hil.ticks import LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
-from controller.state import Array
-from controller.step import LAW_BUFFERS
+from controller.law import control_step as step
+from controller.law.allocation import MOST_ROTORS
+from controller.law.control_step import LAW_BUFFERS
+from controller.law.state import Array
 from sitl_bridge.compiled import entry_point
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND
 from sitl_bridge.mavlink.framing import Bytes

@@ -11,12 +11,12 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import common
 
-from controller.feedback import Feedback, PlainTick, TruthFeedback
+from controller.feedback.truth import Feedback, PlainTick, TruthFeedback
 from controller.hil.answers import AnswerWriter
 from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
-from controller.law import Law
-from controller.state import Array
+from controller.law.control_law import Law
+from controller.law.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
 from sitl_bridge.mavlink.hil import ODOMETRY

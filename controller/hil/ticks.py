@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from controller.state import STATE_SIZE, Array
+from controller.law.state import STATE_SIZE, Array
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 from sitl_bridge.frames import (
     GAUSS_PER_TESLA,

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from controller import step
 from controller.hil import answers, ticks
 from controller.hil.answers import CONTROLS, WRITE_BUFFERS
 from controller.hil.ticks import GPS, LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
-from controller.state import Array
-from controller.step import LAW_BUFFERS
+from controller.law import control_step as step
+from controller.law.control_step import LAW_BUFFERS
+from controller.law.state import Array
 from sitl_bridge.compiled import entry_point
 from sitl_bridge.mavlink.framing import Bytes
 

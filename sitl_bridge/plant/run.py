@@ -9,22 +9,22 @@ from pathlib import Path
 from typing import Literal
 
 from sitl_bridge.mavlink.links import Address, Link, open_link
-from sitl_bridge.mavlink.loss import LossyLink
+from sitl_bridge.mavlink.lossy_link import LossyLink
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import TlogWriter
-from sitl_bridge.plant.account import Account
-from sitl_bridge.plant.faults import Faults
-from sitl_bridge.plant.faulty_link import FaultyLink
-from sitl_bridge.plant.lateness import Lateness
-from sitl_bridge.plant.load_to import LoadTo
-from sitl_bridge.plant.lockstep import Lockstep, OnSilence
-from sitl_bridge.plant.notices import Notices
-from sitl_bridge.plant.realtime import Realtime
+from sitl_bridge.plant.clocks.lateness import Lateness
+from sitl_bridge.plant.clocks.lockstep import Lockstep, OnSilence
+from sitl_bridge.plant.clocks.realtime import Realtime
+from sitl_bridge.plant.faults.impaired_link import FaultyLink
+from sitl_bridge.plant.faults.schedule import Faults
+from sitl_bridge.plant.log.account import Account
+from sitl_bridge.plant.log.notices import Notices
+from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
+from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.simulation import NO_FAULTS, Diverged, Simulation
-from sitl_bridge.plant.state import LOAD_POSITION
-from sitl_bridge.plant.statelog import FILE_NAME, StateLog
+from sitl_bridge.plant.wire.load_to import LoadTo
 from sitl_bridge.process import Speaker, StopRequest
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
 
 REPORT_INTERVAL = 0.2
 """Between two progress events, s."""

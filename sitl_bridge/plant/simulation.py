@@ -16,15 +16,22 @@ from pymavlink.dialects.v20 import common
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, decode
 from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
-from sitl_bridge.plant.answers import AnswerReader
-from sitl_bridge.plant.faults import Action, Faults, from_command, lightest_load, timeline, with_gusts
-from sitl_bridge.plant.messages import TRUTH, TickWriter
-from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH
-from sitl_bridge.plant.slow_frames import LoadOnMap, SlowFrames
-from sitl_bridge.plant.state import Array
+from sitl_bridge.plant.faults.schedule import (
+    Action,
+    Faults,
+    from_command,
+    lightest_load,
+    timeline,
+    with_gusts,
+)
+from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
+from sitl_bridge.plant.physics.state import Array
+from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.tick import exchange
-from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.wire.answers import AnswerReader
+from sitl_bridge.plant.wire.messages import TRUTH, TickWriter
+from sitl_bridge.plant.wire.slow_frames import LoadOnMap, SlowFrames
+from sitl_bridge.vehicle.description import Vehicle
 
 
 class Recorder(Protocol):

@@ -14,16 +14,19 @@ import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.mavlink.framing import Bytes
-from sitl_bridge.plant import answers, dynamics, messages, rows, sensing
-from sitl_bridge.plant.answers import ANSWERED, ARMED, READ_BUFFERS
-from sitl_bridge.plant.dynamics import TABLE_ROWS, WORK_ROWS
-from sitl_bridge.plant.messages import DATAGRAM_SIZE, OUTGOING, STATE, is_due
-from sitl_bridge.plant.parameters import PARAMETERS
-from sitl_bridge.plant.rows import CHUNK_ROWS, WIDTH
+from sitl_bridge.plant.log import rows
+from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.dynamics import TABLE_ROWS, WORK_ROWS
+from sitl_bridge.plant.physics.parameters import PARAMETERS
+from sitl_bridge.plant.physics.state import INNER_SIZE, MOST_ROTORS, REACTIONS_SIZE, STATE_SIZE, Array
+from sitl_bridge.plant.physics.world import SCHEDULE
 from sitl_bridge.plant.sensors import instruments
+from sitl_bridge.plant.sensors import truth as sensing
 from sitl_bridge.plant.sensors.instruments import CHANNELS, MEASUREMENT, ROWS
-from sitl_bridge.plant.state import INNER_SIZE, MOST_ROTORS, REACTIONS_SIZE, STATE_SIZE, Array
-from sitl_bridge.plant.world import SCHEDULE
+from sitl_bridge.plant.wire import answers, messages
+from sitl_bridge.plant.wire.answers import ANSWERED, ARMED, READ_BUFFERS
+from sitl_bridge.plant.wire.messages import DATAGRAM_SIZE, OUTGOING, STATE, is_due
 
 _read_answer = answers.read_answer.python
 _set_rotors = dynamics.set_rotors.python

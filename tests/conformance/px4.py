@@ -13,7 +13,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from sitl.free_ports import free_ports
+from sitl.flights.free_ports import free_ports
 
 PATIENCE = 120.0
 """Generous: two shared cores, perhaps with a compiler at work, s."""

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.allocation import MOST_ROTORS, allocation
-from controller.law import WORK, Design, engaged_memory
-from controller.reference import Path
-from controller.state import LOAD_POSITION, STATE_SIZE, Array
-from controller.step import control_step
-from sitl.metrics import flight_metrics, reference_positions
-from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Vehicle
+from controller.law.allocation import MOST_ROTORS, allocation
+from controller.law.control_law import WORK, Design, engaged_memory
+from controller.law.control_step import control_step
+from controller.law.reference import Path
+from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
+from sitl.flights.metrics import flight_metrics, reference_positions
+from sitl_bridge.plant.physics.world import World
+from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.coordinates import paper_state
 
 
@@ -24,7 +24,7 @@ class Flight(NamedTuple):
     controls: Array  # (n, 16)
     limited: Array  # (n,) whether a rotor was at a limit
     integral: Array  # (n, 3) m s
-    metrics: dict[str, float | bool | None]  # see sitl.metrics
+    metrics: dict[str, float | bool | None]  # see sitl.flights.metrics
 
 
 def fly(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sitl_bridge.plant import state as plant
+from sitl_bridge.plant.physics import state as plant
 
 Vector = Any  # real or complex
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 
 HOVER_SPEED = 500.0  # rad/s
 

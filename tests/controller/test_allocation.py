@@ -10,11 +10,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from controller.allocation import MOST_ROTORS, allocate, allocation
-from controller.state import Array
-from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.vehicle import Vehicle
+from controller.law.allocation import MOST_ROTORS, allocate, allocation
+from controller.law.state import Array
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.fleet import FLEET, attributes
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from controller.awake import AwakeClock
+from controller.pilot.stall_clock import AwakeClock
 
 
 def test_time_passes_while_it_waits_and_works() -> None:

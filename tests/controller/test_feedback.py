@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.autopilot import Autopilot
-from controller.design_names import ON_ESTIMATE
-from controller.estimate_feedback import ALIGNMENT_TIME, EstimateFeedback
+from controller.design.names import ON_ESTIMATE
+from controller.feedback.estimate import ALIGNMENT_TIME, EstimateFeedback
 from controller.hil.session import HilSession, new_session
 from controller.hil.ticks import TickReader
-from controller.reference import setpoint
-from sitl_bridge.description import load_vehicle
+from controller.law.reference import setpoint
+from controller.pilot.autopilot import Autopilot
 from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.hil import HIL_SENSOR, SENSOR_RESET
-from sitl_bridge.plant.lockstep import Lockstep
-from sitl_bridge.plant.notices import Notices
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.network import Faults, Network, Rows
 
 RATE_HZ = 250.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.allocation import allocation
-from controller.flatness import STENCIL, body, flat_motion
-from controller.reference import Path, circle, feasible, setpoint
-from controller.state import (
+from controller.law.allocation import allocation
+from controller.law.flatness import STENCIL, body, flat_motion
+from controller.law.reference import Path, circle, feasible, setpoint
+from controller.law.state import (
     BODY_RATES,
     EULER_ANGLES,
     LOAD_POSITION,
@@ -17,9 +17,9 @@ from controller.state import (
     WRENCH_SIZE,
     Array,
 )
-from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.coordinates import paper_state, plant_state
 from tests.controller.fleet import FLEET, attributes
 

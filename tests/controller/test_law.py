@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from controller.design_names import DESIGNS
-from controller.designs import design
-from controller.law import WORK, Design, engaged_memory, remember, step
-from controller.reference import Path, circle, setpoint
-from controller.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.vehicle import Vehicle
+from controller.design.catalogue import design
+from controller.design.names import DESIGNS
+from controller.law.control_law import WORK, Design, engaged_memory, remember, step
+from controller.law.reference import Path, circle, setpoint
+from controller.law.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.closed_loop import Flight, fly
 from tests.controller.fleet import FLEET, attributes, delayed
 

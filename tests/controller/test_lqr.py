@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from controller.designs import default_weights, paper_lqr_weights, paper_weights
-from controller.lqr import (
+from controller.design.catalogue import default_weights, paper_lqr_weights, paper_weights
+from controller.design.lqr import (
     SampledGain,
     SampledModel,
     Weights,
@@ -15,9 +15,9 @@ from controller.lqr import (
     sampled_gain,
     sampled_model,
 )
-from controller.model import LinearModel, linear_model, with_integrator, with_rotor_lag
-from controller.state import Array
-from sitl_bridge.vehicle import Vehicle
+from controller.design.model import LinearModel, linear_model, with_integrator, with_rotor_lag
+from controller.law.state import Array
+from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.fleet import FLEET
 
 PAPER = FLEET["paper"]

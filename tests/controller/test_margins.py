@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from controller.analysis import closed_loop_matrix, delay_margin, spectral_radius
-from controller.design_names import DESIGNS
-from controller.designs import design
-from controller.law import WORK, Design, engaged_memory, remember, step
-from controller.model import LinearModel, actuated_model
-from controller.reference import setpoint
-from controller.state import LOAD_POSITION, STATE_SIZE, Array
-from sitl_bridge.vehicle import Vehicle
+from controller.design.catalogue import design
+from controller.design.margins import closed_loop_matrix, delay_margin, spectral_radius
+from controller.design.model import LinearModel, actuated_model
+from controller.design.names import DESIGNS
+from controller.law.control_law import WORK, Design, engaged_memory, remember, step
+from controller.law.reference import setpoint
+from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
+from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.fleet import FLEET, attributes, delayed
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controller.allocation import allocation
-from controller.model import actuated_model, linear_model, rotor_time_constant, with_rotor_lag
-from controller.state import STATE_SIZE
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.vehicle import Vehicle
+from controller.design.model import actuated_model, linear_model, rotor_time_constant, with_rotor_lag
+from controller.law.allocation import allocation
+from controller.law.state import STATE_SIZE
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.coordinates import paper_state, plant_state
 from tests.controller.fleet import FLEET, attributes
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from controller.designs import EVEN, Emphasis, guided_designs
-from controller.law import Design
-from controller.redesign import DesignProcess
-from sitl_bridge.description import load_vehicle
+from controller.design.catalogue import EVEN, Emphasis, guided_designs
+from controller.design.client import DesignProcess
+from controller.law.control_law import Design
+from sitl_bridge.vehicle.files import load_vehicle
 
 IRIS = load_vehicle("iris", [])
 HEAVY = EVEN._replace(load_position=4.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.reference import (
+from controller.law.reference import (
     DERIVATIVES,
     LARGEST_ACCELERATION,
     LARGEST_SPEED,
@@ -18,7 +18,7 @@ from controller.reference import (
     path_derivatives,
     setpoint,
 )
-from controller.state import Array
+from controller.law.state import Array
 from tests.controller.fleet import attributes
 
 coordinate = st.floats(-20.0, 20.0)

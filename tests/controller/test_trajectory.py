@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from controller.allocation import MOST_ROTORS, allocation
-from controller.designs import guided_designs
-from controller.ground.targets import Body, Follow, Goto, Land
-from controller.law import WORK, engaged_memory
-from controller.reference import DERIVATIVES
-from controller.state import LOAD_POSITION, STATE_SIZE, Array
-from controller.step import control_step
-from controller.trajectory import MOST_JERK, POLE, Limits, Trajectory, stopping_distance
+from controller.design.catalogue import guided_designs
+from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
+from controller.ground.flight.trajectory import MOST_JERK, POLE, Limits, Trajectory, stopping_distance
+from controller.law.allocation import MOST_ROTORS, allocation
+from controller.law.control_law import WORK, engaged_memory
+from controller.law.control_step import control_step
+from controller.law.reference import DERIVATIVES
+from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
 from tests.controller.fleet import FLEET
 
 PERIOD = 0.004

@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.design.lqr import Weights, sampled_gain, sampled_model
+from controller.design.model import linear_model, with_integrator
 from controller.estimator.filter import Estimator
-from controller.estimator.layout import ACCELEROMETER, GPS_POSITION, PARTS
+from controller.estimator.records import ACCELEROMETER, GPS_POSITION, PARTS
 from controller.estimator.tuning import Tuning
-from controller.lqr import Weights, sampled_gain, sampled_model
-from controller.model import linear_model, with_integrator
 from sitl_bridge.frames import euler_from_quaternion
-from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.physics.world import World
+from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
 CONSUMER = Tuning()

@@ -10,20 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.estimate_feedback import EstimateFeedback
-from controller.estimate_health import EstimateAssessor
-from controller.ground.modes import Machine
+from controller.feedback.estimate import EstimateFeedback
+from controller.feedback.health import EstimateAssessor
+from controller.ground.flight.modes import Machine
 from controller.ground.station import Station
-from controller.ground.view import profile_of
-from controller.guided import GuidedAutopilot
+from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
-from controller.state import Array
-from sitl_bridge.description import validated
-from sitl_bridge.plant.faults import Faults
-from sitl_bridge.plant.lockstep import Lockstep
-from sitl_bridge.plant.notices import Notices
+from controller.law.state import Array
+from controller.pilot.ground_piloted import GuidedAutopilot
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.faults.schedule import Faults
+from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import validated
 
 RATE_HZ = 250.0
 COLUMNS = ("time", "truth", "estimate")

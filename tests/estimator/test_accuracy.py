@@ -6,11 +6,11 @@ import functools
 import numpy as np
 import pytest
 
-from controller.estimator.bound import load_relative_bound
-from controller.estimator.layout import PARTS, X_LOAD_WIND
-from controller.estimator.weights import estimated_weights
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.vehicle import Vehicle
+from controller.design.estimated_weights import estimated_weights
+from controller.estimator.records import PARTS, X_LOAD_WIND
+from controller.estimator.riccati_bound import load_relative_bound
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.flights import CONSUMER, PERIOD, RTK, Flight, Sensors, fly
 
 TUNINGS = {"consumer": CONSUMER, "rtk": RTK}

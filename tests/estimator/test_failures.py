@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from controller.design.estimated_weights import estimated_weights
 from controller.estimator.filter import Estimator
-from controller.estimator.layout import LOAD_ON_CABLE, LOAD_RELEASED, SENSORS
-from controller.estimator.weights import estimated_weights
+from controller.estimator.records import LOAD_ON_CABLE, LOAD_RELEASED, SENSORS
 from sitl_bridge.frames import rotate_inverse
-from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speed
 from tests.estimator.flights import CONSUMER, HELD_TICKS, PERIOD, RATE_HZ, Flight, Sample, fly
 from tests.estimator.test_accuracy import paper
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from controller.estimator.layout import LOAD_ON_CABLE, LOAD_ON_GROUND, PARTS, X_LOAD, Array
-from controller.ground.modes import Reposition
-from controller.ground.px4_modes import Mode
-from sitl_bridge.description import load_vehicle
+from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, PARTS, X_LOAD, Array
+from controller.ground.flight.modes import Reposition
+from controller.ground.flight.px4_modes import Mode
 from sitl_bridge.plant.sensors.instruments import LOST, WORKS
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import RATE_HZ, GuidedFlight
 
 NAN = math.nan

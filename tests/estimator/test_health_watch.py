@@ -1,7 +1,7 @@
 """What the estimator says of itself: each change once, in words."""
 
 from controller.estimator.filter import Estimator, Health
-from controller.health_watch import HealthWatch, sensors_good
+from controller.feedback.health_notices import HealthWatch, sensors_good
 from tests.estimator.test_numerics import hovering
 
 

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
+from controller.estimator.correct.update import CORRECTION, SMALLEST_SWING, inject
 from controller.estimator.filter import Estimator, eq31_jacobian
-from controller.estimator.layout import ERROR_SIZE, LOAD_ON_CABLE, PARTS, SENSORS, X_LOAD, Array
-from controller.estimator.update import CORRECTION, SMALLEST_SWING, inject
+from controller.estimator.records import ERROR_SIZE, LOAD_ON_CABLE, PARTS, SENSORS, X_LOAD, Array
 from sitl_bridge import compiled
-from sitl_bridge.vehicle import hover_rotor_speed
+from sitl_bridge.vehicle.description import hover_rotor_speed
 from tests.estimator.flights import CONSUMER, PERIOD
 from tests.estimator.test_accuracy import paper
 

@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.designs import Emphasis, guided_designs
-from controller.ground.guidance import Stage
-from controller.ground.peers import Address
+from controller.design.catalogue import Emphasis, guided_designs
+from controller.ground.flight.guidance import Stage
+from controller.ground.link.peers import Address
 from controller.ground.station import Station
-from controller.ground.view import profile_of
-from controller.guided import GuidedAutopilot
+from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
-from controller.law import Design
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.lockstep import Lockstep
-from sitl_bridge.plant.notices import Notices
+from controller.law.control_law import Design
+from controller.pilot.ground_piloted import GuidedAutopilot
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.log.notices import Notices
+from sitl_bridge.plant.physics.state import LOAD_POSITION as PLANT_LOAD
+from sitl_bridge.plant.physics.state import VEHICLE_POSITION as PLANT_VEHICLE
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.state import LOAD_POSITION as PLANT_LOAD
-from sitl_bridge.plant.state import VEHICLE_POSITION as PLANT_VEHICLE
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.rig import Client
 from tests.loopback import swing
 

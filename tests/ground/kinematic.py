@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from controller.ground.targets import Body, Follow, Goto, Idle, Land, Target, Terminate
-from controller.ground.view import Profile, VehicleView
+from controller.ground.flight.setpoint_types import Body, Follow, Goto, Idle, Land, Target, Terminate
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import LocalOrigin, Triple, quaternion_from_euler
 
 ZURICH = (47.397742, 8.545594, 488.0)

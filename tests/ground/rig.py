@@ -10,11 +10,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.parameter_file import ParameterFile
-from controller.ground.peers import Address
-from controller.ground.signing import Signing
+from controller.ground.link.peers import Address
+from controller.ground.link.signing import Signing
+from controller.ground.parameters.file import ParameterFile
 from controller.ground.station import Station
-from controller.ground.view import Profile, VehicleView
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.mavlink.framing import Packer, decode, split
 from tests.ground.kinematic import PROFILE, grounded_view, step
 

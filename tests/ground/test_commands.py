@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 from pymavlink.dialects.v20 import development
 
-from controller.ground.px4_modes import Mode
+from controller.ground.flight.px4_modes import Mode
 from tests.ground.rig import Channel, Rig
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3

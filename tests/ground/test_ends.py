@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.targets import Body, Goto, Idle, Land, Terminate
-from controller.ground.view import Profile
+from controller.ground.flight.setpoint_types import Body, Goto, Idle, Land, Terminate
+from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import LocalOrigin
 from tests.ground.in_flight import ACCEPTED, DENIED, REJECTED, flying
 from tests.ground.kinematic import ZURICH, grounded_view

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.peers import SILENCE
-from controller.ground.targets import Terminate
+from controller.ground.flight.setpoint_types import Terminate
+from controller.ground.link.peers import SILENCE
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.in_flight import ACCEPTED, flying, local_setpoint, mode, set_parameter, stream
 from tests.ground.rig import Rig

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.wire import frame
-from controller.guided import WEIGHTS
+from controller.ground.link.packing import frame
+from controller.pilot.ground_piloted import WEIGHTS
 from sitl_bridge.mavlink.framing import Frame, split
 from tests.ground.flown import Flown
 from tests.ground.rig import NAN, Client

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.wire import frame
+from controller.ground.link.packing import frame
 from tests.ground.rig import NAN, Channel, Rig
 
 SPICE = [NAN, float("inf"), float("-inf"), -1.0, 0.0, 1.0, 2.0, 21196.0, 1e38, 0.5]

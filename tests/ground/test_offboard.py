@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.targets import Follow
-from controller.ground.view import profile_of
-from controller.trajectory import stopping_distance
-from sitl_bridge.description import load_vehicle
+from controller.ground.flight.setpoint_types import Follow
+from controller.ground.flight.trajectory import stopping_distance
+from controller.ground.telemetry.vehicle_state import profile_of
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.in_flight import ACCEPTED, REJECTED, flying, local_setpoint, mode, stream
 from tests.ground.kinematic import PROFILE
 from tests.ground.rig import NAN, Rig

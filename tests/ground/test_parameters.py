@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.parameter_file import ParameterFile
-from controller.ground.parameter_table import BY_NAME, TABLE, Parameter, markdown
-from controller.ground_link import GroundLink, GroundOptions, Ports
-from sitl_bridge.description import load_vehicle
+from controller.ground.parameters.file import ParameterFile
+from controller.ground.parameters.table import BY_NAME, TABLE, Parameter, markdown
+from controller.pilot.ground_link import GroundLink, GroundOptions, Ports
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.rig import Channel, Client, Rig
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
@@ -131,7 +131,7 @@ def test_an_integer_whose_bytes_are_a_signalling_nan_survives() -> None:
     rig = Rig()
     client = rig.client()
     payload = struct.pack("<iBB16sB", 0x7F800001, 1, 1, b"CAL_GYRO0_ID", INT32)
-    from controller.ground.wire import frame
+    from controller.ground.link.packing import frame
 
     client.send_raw(frame(payload, 23, mavlink.MAVLink_param_set_message.crc_extra, 0, 255, 190, False))
     rig.run(0.04)

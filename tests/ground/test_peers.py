@@ -10,9 +10,9 @@ import pytest
 from pymavlink.dialects.v10 import common as v1
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.peers import MOST_PEERS, SILENCE
-from controller.ground.sockets import FRAMES_AT_ONCE, MOST_BYTES, BindError, GroundSockets
-from controller.ground.streams import DEFAULT_RATES
+from controller.ground.link.peers import MOST_PEERS, SILENCE
+from controller.ground.link.sockets import FRAMES_AT_ONCE, MOST_BYTES, BindError, GroundSockets
+from controller.ground.telemetry.message_rates import DEFAULT_RATES
 from sitl_bridge.mavlink.framing import Packer, split
 from tests.ground.rig import Rig
 

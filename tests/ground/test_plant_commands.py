@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.plant_commands import PATIENCE, REPEAT
+from controller.ground.commands.plant_commands import PATIENCE, REPEAT
 from sitl_bridge.mavlink.framing import Packer, split
 from tests.ground.rig import NAN, Client, Rig
 

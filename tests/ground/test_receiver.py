@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.guided_receiver import SILENCE, Receiver
-from sitl_bridge.description import load_vehicle
+from controller.pilot.gps_display import SILENCE, Receiver
 from sitl_bridge.mavlink.hil import HIL_GPS
 from sitl_bridge.plant.sensors.instruments import LOST, OFF, WORKS
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
 from tests.ground.flown import Flown
 from tests.ground.rig import Client

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.signing import EPOCH, KeyFileError, Signing, read_key
-from controller.ground_link import GroundLink, GroundOptions, Ports
-from sitl_bridge.description import load_vehicle
+from controller.ground.link.signing import EPOCH, KeyFileError, Signing, read_key
+from controller.pilot.ground_link import GroundLink, GroundOptions, Ports
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.rig import Client, Rig
 
 KEY = bytes(range(32))

@@ -8,11 +8,11 @@ import math
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.streams import STREAMABLE
-from controller.ground.telemetry import CAPABILITIES, cell_voltages
-from controller.ground.view import Gps, profile_of
-from sitl_bridge.description import load_vehicle
+from controller.ground.telemetry.message_rates import STREAMABLE
+from controller.ground.telemetry.messages import CAPABILITIES, cell_voltages
+from controller.ground.telemetry.vehicle_state import Gps, profile_of
 from sitl_bridge.frames import Geodetic, quaternion_from_euler
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.kinematic import ZURICH, grounded_view
 from tests.ground.rig import Client, Rig
 

@@ -12,7 +12,15 @@ from pymavlink.dialects.v10 import common as v1
 from pymavlink.dialects.v20 import common as mavlink
 from pymavlink.dialects.v20 import development
 
-from controller.ground.wire import AvailableModes, CurrentMode, Packed, checksum, frame, frame_v1, packed
+from controller.ground.link.packing import (
+    AvailableModes,
+    CurrentMode,
+    Packed,
+    checksum,
+    frame,
+    frame_v1,
+    packed,
+)
 from sitl_bridge.mavlink.framing import split
 
 
@@ -52,8 +60,8 @@ def test_nothing_is_imported_for_the_first_frame_of_mavlink_1() -> None:
     """Imports take longer than the control loop has."""
     program = """
 import sys
-from controller.ground_link import GroundLink
-from controller.ground.wire import frame_v1
+from controller.pilot.ground_link import GroundLink
+from controller.ground.link.packing import frame_v1
 before = set(sys.modules)
 assert frame_v1(bytes(9), 0, 50, 0, 1, 1)
 assert set(sys.modules) == before, set(sys.modules) - before

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from sitl.free_ports import free_ports
+from sitl.flights.free_ports import free_ports
 from tests.loopback.conftest import Process
 
 

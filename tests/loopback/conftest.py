@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from sitl.free_ports import free_ports
+from sitl.flights.free_ports import free_ports
 
 PATIENCE = 120.0
 """Generous: two shared cores, perhaps with a compiler at work, s."""

@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from controller.estimate_log import COLUMNS, COVARIANCE_COLUMNS
+from controller.feedback.log import COLUMNS, COVARIANCE_COLUMNS
 
 Fly = Callable[..., dict[str, Any]]
 ON_ESTIMATE = (

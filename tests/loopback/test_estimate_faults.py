@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from sitl.scenario import load_scenario, scenario_names
+from sitl.flights.scenario import load_scenario, scenario_names
 
 Fly = Callable[..., dict[str, Any]]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from sitl_bridge.plant.faults import LinkFault
-from sitl_bridge.plant.faulty_link import FaultyLink
+from sitl_bridge.plant.faults.impaired_link import FaultyLink
+from sitl_bridge.plant.faults.schedule import LinkFault
 
 Fly = Callable[..., dict[str, Any]]
 

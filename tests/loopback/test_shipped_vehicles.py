@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from controller.analysis import closed_loop_matrix, delay_margin, spectral_radius
-from controller.designs import design
-from controller.model import actuated_model
-from sitl_bridge.description import load_vehicle, vehicle_names
+from controller.design.catalogue import design
+from controller.design.margins import closed_loop_matrix, delay_margin, spectral_radius
+from controller.design.model import actuated_model
+from sitl_bridge.vehicle.files import load_vehicle, vehicle_names
 
 RATE = 250.0
 STEP = 3.0  # m

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
 

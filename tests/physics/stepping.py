@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import PARAMETERS, Parameters
-from sitl_bridge.plant.state import CABLE_HOLDS, INNER_SIZE, MOST_ROTORS, STATE_SIZE
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.parameters import PARAMETERS, Parameters
+from sitl_bridge.plant.physics.state import CABLE_HOLDS, INNER_SIZE, MOST_ROTORS, STATE_SIZE
+from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
 

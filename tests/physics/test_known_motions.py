@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant import dynamics
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.plant.state import LOAD_POSITION, VEHICLE_POSITION, initial_state
-from sitl_bridge.vehicle import Vehicle, hover_rotor_speed
+from sitl_bridge.plant.physics import dynamics
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.plant.physics.state import LOAD_POSITION, VEHICLE_POSITION, initial_state
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speed
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.physics.stepping import Array, arrays, fields, fly, padded, rotor_speeds
 
 

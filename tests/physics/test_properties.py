@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from scipy.integrate import simpson
 from scipy.spatial.transform import Rotation
 
-from sitl_bridge.plant.state import (
+from sitl_bridge.plant.physics.state import (
     ATTITUDE,
     BODY_RATES,
     LOAD_POSITION,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, initial_state
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.plant.physics.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, initial_state
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.physics.second_formulation import simulate
 from tests.physics.stepping import Array, fly, rotor_speeds
 

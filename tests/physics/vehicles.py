@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.parameters import Parameters, parameters
-from sitl_bridge.plant.state import (
+from sitl_bridge.plant.physics.parameters import Parameters, parameters
+from sitl_bridge.plant.physics.state import (
     ATTITUDE,
     BODY_RATES,
     LOAD_POSITION,
@@ -19,7 +18,8 @@ from sitl_bridge.plant.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from sitl_bridge.vehicle import Rotor, Vehicle
+from sitl_bridge.vehicle.description import Rotor, Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.physics.stepping import Array
 
 

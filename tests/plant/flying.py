@@ -8,12 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.description import load_vehicle, validated
-from sitl_bridge.plant.dynamics import TABLE_ROWS, WORK_ROWS, advance
-from sitl_bridge.plant.parameters import parameters
-from sitl_bridge.plant.sensing import measure
-from sitl_bridge.plant.sensors.instruments import MEASUREMENT
-from sitl_bridge.plant.state import (
+from sitl_bridge.plant.physics.dynamics import TABLE_ROWS, WORK_ROWS, advance
+from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.plant.physics.state import (
     INNER_SIZE,
     LOAD_VELOCITY,
     MOST_ROTORS,
@@ -23,7 +20,10 @@ from sitl_bridge.plant.state import (
     initial_inner_state,
     initial_state,
 )
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.plant.sensors.instruments import MEASUREMENT
+from sitl_bridge.plant.sensors.truth import measure
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle, validated
 
 Array = NDArray[np.float64]
 

@@ -11,13 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from controller.autopilot import Autopilot
 from controller.hil.session import HilSession, new_session
-from controller.reference import setpoint
-from sitl_bridge.description import load_vehicle
+from controller.law.reference import setpoint
+from controller.pilot.autopilot import Autopilot
+from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Vehicle
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 
 
 class Endpoint(Protocol):

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.air import WIND_HOLD, Wind, gust_velocity
-from sitl_bridge.plant.disturbance import HeldWind
-from sitl_bridge.plant.parameters import step_count
-from sitl_bridge.plant.streams import stream
-from sitl_bridge.plant.turbulence import Turbulent, dryden
-from sitl_bridge.vehicle import Gust, Turbulence, Vehicle
+from sitl_bridge.plant.physics.air import WIND_HOLD, Wind, gust_velocity
+from sitl_bridge.plant.physics.disturbance import HeldWind
+from sitl_bridge.plant.physics.parameters import step_count
+from sitl_bridge.plant.physics.turbulence import Turbulent, dryden
+from sitl_bridge.plant.random_streams import stream
+from sitl_bridge.vehicle.description import Gust, Turbulence, Vehicle
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.flying import flight
 
 TURBULENCE = Turbulence(wind_at_6_m=15.4, height=10.0, airspeed=8.0)

@@ -7,9 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.parameters import LONGEST_STEP, fastest_rate, step_count
-from sitl_bridge.plant.state import CABLE_HOLDS, LOAD_POSITION, LOAD_VELOCITY, TENSION, VEHICLE_VELOCITY
+from sitl_bridge.plant.physics.parameters import LONGEST_STEP, fastest_rate, step_count
+from sitl_bridge.plant.physics.state import (
+    CABLE_HOLDS,
+    LOAD_POSITION,
+    LOAD_VELOCITY,
+    TENSION,
+    VEHICLE_VELOCITY,
+)
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.flying import Array, Flight, energy, flight, plain_vehicle
 
 

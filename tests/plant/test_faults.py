@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
-from sitl_bridge.description import DescriptionError, load_vehicle, validated
 from sitl_bridge.mavlink.framing import Packer, decode, split
-from sitl_bridge.plant.faults import (
+from sitl_bridge.plant.faults.impairments import FaultyPath
+from sitl_bridge.plant.faults.schedule import (
     FAILURES,
     Due,
     Faults,
@@ -26,12 +26,12 @@ from sitl_bridge.plant.faults import (
     from_command,
     timeline,
 )
-from sitl_bridge.plant.link_faults import FaultyPath
+from sitl_bridge.plant.physics.state import CABLE_HOLDS
+from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.sensors.gps import NO_FIX
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.plant.simulation import Diverged, Simulation
-from sitl_bridge.plant.state import CABLE_HOLDS
-from sitl_bridge.plant.world import World
+from sitl_bridge.vehicle.files import DescriptionError, load_vehicle, validated
 
 TABLE = {
     "sensor": [

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from sitl_bridge.description import DescriptionError, load_vehicle
-from sitl_bridge.plant.parameters import step_count
-from sitl_bridge.plant.state import (
+from sitl_bridge.plant.physics.parameters import step_count
+from sitl_bridge.plant.physics.state import (
     BODY_RATES,
     LOAD_GROUND_FORCE,
     LOAD_POSITION,
@@ -19,6 +18,7 @@ from sitl_bridge.plant.state import (
     VEHICLE_GROUND_FORCE,
     VEHICLE_VELOCITY,
 )
+from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 from tests.plant.flying import Flight, energy, flight, plain_vehicle
 
 

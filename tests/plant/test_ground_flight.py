@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sitl_bridge.plant.parameters import step_count
-from sitl_bridge.plant.state import (
+from sitl_bridge.plant.physics.parameters import step_count
+from sitl_bridge.plant.physics.state import (
     LOAD_GROUND_FORCE,
     LOAD_POSITION,
     LOAD_VELOCITY,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sitl_bridge.plant.lateness import Lateness
+from sitl_bridge.plant.clocks.lateness import Lateness
 
 
 def test_percentiles_as_of_a_list() -> None:

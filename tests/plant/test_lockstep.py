@@ -13,8 +13,8 @@ from controller.hil.answers import AnswerWriter
 from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Packer, split
 from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS, HIL_SENSOR
-from sitl_bridge.plant.lockstep import Lockstep
-from sitl_bridge.plant.notices import Notices
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.log.notices import Notices
 from tests.plant.network import Faults, Network, Rows, autopilot_session, paper, simulation
 
 DURATION = 0.4
@@ -232,7 +232,7 @@ def test_controls_that_are_not_finite_stop_their_rotors() -> None:
 
 
 def test_loop_delay_applies_each_command_that_many_ticks_later() -> None:
-    from sitl_bridge.description import load_vehicle
+    from sitl_bridge.vehicle.files import load_vehicle
 
     said: list[str] = []
     vehicle = load_vehicle("paper", ["loop.delay_ticks=3"])

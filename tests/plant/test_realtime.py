@@ -8,8 +8,8 @@ import pytest
 from controller.hil.answers import AnswerWriter
 from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Packer
-from sitl_bridge.plant.notices import Notices
-from sitl_bridge.plant.realtime import AUTOPILOT_TIMEOUT, Realtime
+from sitl_bridge.plant.clocks.realtime import AUTOPILOT_TIMEOUT, Realtime
+from sitl_bridge.plant.log.notices import Notices
 from tests.plant.network import Faults, Network, autopilot_session, paper, simulation
 from tests.plant.test_lockstep import Scripted
 

@@ -8,16 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.battery import (
+from sitl_bridge.plant.physics.battery import (
     drained,
     electric_power,
     power_coefficients,
     reading,
     shaft_coefficient,
 )
-from sitl_bridge.plant.world import World
-from sitl_bridge.vehicle import Battery, Vehicle, hover_rotor_speeds
+from sitl_bridge.plant.physics.world import World
+from sitl_bridge.vehicle.description import Battery, Vehicle, hover_rotor_speeds
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.flying import Flight, flight
 
 BATTERY = Battery(cells=4, capacity=5.0, resistance=0.05)

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from sitl_bridge.description import load_vehicle
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.mavlink.tlog import TlogWriter
 from sitl_bridge.plant import run
-from sitl_bridge.plant.state import STOPPED
+from sitl_bridge.plant.physics.state import STOPPED
 from sitl_bridge.process import Speaker, StopRequest
+from sitl_bridge.vehicle.files import load_vehicle
 
 
 def options(out: Path, **more: Any) -> run.PlantOptions:

@@ -10,8 +10,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import lpmv
 
-from sitl_bridge.description import load_vehicle
 from sitl_bridge.magnetic import EPOCH, field_at
+from sitl_bridge.plant.physics.state import STATE_SIZE
+from sitl_bridge.plant.physics.world import World
+from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.plant.sensors.atmosphere import air_pressure, air_temperature
 from sitl_bridge.plant.sensors.gps import FIX_3D, NO_FIX, GpsReceiver
 from sitl_bridge.plant.sensors.instruments import (
@@ -28,11 +30,9 @@ from sitl_bridge.plant.sensors.instruments import (
 )
 from sitl_bridge.plant.sensors.noise import GaussMarkov, RandomWalk, White
 from sitl_bridge.plant.sensors.tracker import LoadTracker
-from sitl_bridge.plant.state import STATE_SIZE
-from sitl_bridge.plant.streams import stream
-from sitl_bridge.plant.world import World
-from sitl_bridge.sensors import Gps, Instrument, Sensors, Tracker
-from sitl_bridge.vehicle import Home
+from sitl_bridge.vehicle.description import Home
+from sitl_bridge.vehicle.files import load_vehicle
+from sitl_bridge.vehicle.sensors import Gps, Instrument, Sensors, Tracker
 
 Array = NDArray[np.float64]
 RATE = 250.0

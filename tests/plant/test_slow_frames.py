@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common
 
-from sitl_bridge.description import load_vehicle
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, Packer, decode, split
-from sitl_bridge.plant.load_to import LoadTo
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.wire.load_to import LoadTo
+from sitl_bridge.vehicle.files import load_vehicle
 
 RATE = 250.0
 INSTANCE = 3

@@ -8,17 +8,17 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from controller.autopilot import Autopilot
-from controller.estimate_feedback import EstimateFeedback
-from controller.feedback import Feedback, TruthFeedback
+from controller.feedback.estimate import EstimateFeedback
+from controller.feedback.truth import Feedback, TruthFeedback
 from controller.hil.session import new_session
-from controller.reference import setpoint
-from sitl_bridge.description import load_vehicle
-from sitl_bridge.plant.faults import Faults, LoadFault, RotorFault, SensorFault
-from sitl_bridge.plant.lockstep import Lockstep
-from sitl_bridge.plant.notices import Notices
+from controller.law.reference import setpoint
+from controller.pilot.autopilot import Autopilot
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.faults.schedule import Faults, LoadFault, RotorFault, SensorFault
+from sitl_bridge.plant.log.notices import Notices
+from sitl_bridge.plant.log.state_log import StateLog
 from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
-from sitl_bridge.plant.statelog import StateLog
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.network import Faults as Loss
 from tests.plant.network import Network
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from controller.estimator.filter import Estimator
-from sitl import bench, ground_bench
-from sitl_bridge.description import load_vehicle
+from sitl.benchmark import bench
+from sitl.benchmark import ground as ground_bench
+from sitl_bridge.vehicle.files import load_vehicle
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmark.md"
 

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sitl import bench, cli
-from sitl.arguments import build_parser
-from sitl.flight import new_folder
-from sitl.fly import FlightError
-from sitl.report import PROMISED, table, write_report
+from sitl.benchmark import bench
+from sitl.command_line import commands as cli
+from sitl.command_line.arguments import build_parser
+from sitl.flights.flight import new_folder
+from sitl.flights.launch import FlightError
+from sitl.flights.report import PROMISED, table, write_report
 
 
 def test_flying_alone_is_the_papers_experiment_whatever_options_stand_before() -> None:
@@ -145,7 +146,7 @@ def test_an_interrupt_while_it_starts_is_one_line(command: str) -> None:
         "from sitl import start\n"
         "class Strikes:\n"
         "    def find_spec(self, name, *rest):\n"
-        "        if name == 'sitl.cli':\n"
+        "        if name == 'sitl.command_line.commands':\n"
         "            os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Strikes())\n"
         f"sys.argv[1:] = {command.split()!r}\n"

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.estimate_log import COLUMNS, COVARIANCE_COLUMNS, UPPER
-from sitl.estimate_metrics import Log, errors, estimate_metrics
+from controller.feedback.log import COLUMNS, COVARIANCE_COLUMNS, UPPER
+from sitl.flights.estimate_metrics import Log, errors, estimate_metrics
 from sitl_bridge.frames import quaternion_from_euler
-from sitl_bridge.plant.state import COLUMNS as TRUE_COLUMNS
+from sitl_bridge.plant.physics.state import COLUMNS as TRUE_COLUMNS
 
 ROWS = 5001
 

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from sitl import free_ports
+from sitl.flights import free_ports
 
 KINDS = [socket.SOCK_DGRAM, socket.SOCK_STREAM]
 

@@ -14,12 +14,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.paper import linear, motions, page, riccati, sampling, second
-from sitl.paper.position import vehicle_with
-from sitl.paper.record import CORRECTED, NOT_JUDGED, REPRODUCED, UNSETTLED, UNSUPPORTED, WITHIN, Ledger
-from sitl.paper.run import run
-from sitl_bridge.description import load_vehicle
+from sitl.studies.paper import independent_simulation as second
+from sitl.studies.paper import linear, motions, page, riccati, sampling
+from sitl.studies.paper.position import vehicle_with
+from sitl.studies.paper.record import (
+    CORRECTED,
+    NOT_JUDGED,
+    REPRODUCED,
+    UNSETTLED,
+    UNSUPPORTED,
+    WITHIN,
+    Ledger,
+)
+from sitl.studies.paper.run import run
 from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle.files import load_vehicle
 
 VERDICTS = {
     "model": CORRECTED,

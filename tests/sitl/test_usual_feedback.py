@@ -2,7 +2,7 @@
 
 import pytest
 
-from sitl.scenario import load_scenario, plant_vehicle, scenario_vehicle, usual_feedback
+from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle, usual_feedback
 
 
 @pytest.mark.parametrize(

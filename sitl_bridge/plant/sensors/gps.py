@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sitl_bridge.frames import Triple
+from sitl_bridge.plant.physics.state import VEHICLE_POSITION, VEHICLE_VELOCITY, Array
+from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
 from sitl_bridge.plant.sensors.noise import Dropouts, GaussMarkov
-from sitl_bridge.plant.state import VEHICLE_POSITION, VEHICLE_VELOCITY, Array
-from sitl_bridge.plant.streams import stream
-from sitl_bridge.sensors import Gps
+from sitl_bridge.vehicle.sensors import Gps
 
 SMALLEST_ACCURACY = 0.01  # m; the wire's unit, and what a receiver says of itself at best
 NO_FIX, FIX_3D = 1, 3

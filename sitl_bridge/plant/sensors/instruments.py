@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
+from sitl_bridge.plant.physics.state import Array
+from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.plant.sensors.atmosphere import SEA_LEVEL_PRESSURE
 from sitl_bridge.plant.sensors.noise import RandomWalk, White
-from sitl_bridge.plant.state import Array
-from sitl_bridge.plant.streams import stream
-from sitl_bridge.sensors import Instrument, Sensors
+from sitl_bridge.vehicle.sensors import Instrument, Sensors
 
 MEASUREMENT = np.dtype(
     [

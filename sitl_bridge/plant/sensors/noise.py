@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from sitl_bridge.plant.state import Array
+from sitl_bridge.plant.physics.state import Array
 
 
 class White:

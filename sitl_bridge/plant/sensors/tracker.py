@@ -7,10 +7,10 @@ from collections import deque
 from typing import NamedTuple
 
 from sitl_bridge.frames import Triple, rotate_inverse
+from sitl_bridge.plant.physics.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
+from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.plant.sensors.instruments import GARBAGE, OFF, STUCK, WORKS, WRONG
-from sitl_bridge.plant.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, Array
-from sitl_bridge.plant.streams import stream
-from sitl_bridge.sensors import Tracker
+from sitl_bridge.vehicle.sensors import Tracker
 
 WRONG_BY = 0.5
 """m, forward, of a wrong camera."""

@@ -18,8 +18,8 @@ import pytest
 from pymavlink.dialects.v10 import common as mavlink1
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.parameter_table import TABLE
-from sitl.free_ports import free_ports
+from controller.ground.parameters.table import TABLE
+from sitl.flights.free_ports import free_ports
 from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.by_hand import ByHand

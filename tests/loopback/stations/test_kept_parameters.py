@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from sitl.free_ports import free_ports
+from sitl.flights.free_ports import free_ports
 from tests.loopback.clients import Vehicle, mavsdk_vehicle, send_command
 from tests.loopback.conftest import Process
 

@@ -1,0 +1,441 @@
+"""What each sensor says about the state: innovations, measurement rows, gates."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from controller.estimator.correct.update import ROW, begin, fuse, inject, predicted_variance
+from controller.estimator.predict.forces import cable, drag_rate
+from controller.estimator.predict.rotation import matrix
+from controller.estimator.records import (
+    ACCEL_BIAS,
+    ACCELEROMETER,
+    ATTITUDE,
+    BARO_OFFSET,
+    BAROMETER,
+    FLYING,
+    FORCE,
+    GYRO_BIAS,
+    GYROSCOPE,
+    LOAD,
+    LOAD_VELOCITY,
+    MAG_BIAS,
+    MAGNETOMETER,
+    POSITION,
+    RATES,
+    VELOCITY,
+    X_ACCEL_BIAS,
+    X_BARO_OFFSET,
+    X_FORCE,
+    X_GYRO_BIAS,
+    X_LOAD,
+    X_LOAD_VELOCITY,
+    X_MAG_BIAS,
+    X_POSITION,
+    X_RATES,
+    X_VELOCITY,
+    Array,
+    Filter,
+)
+from sitl_bridge.compiled import kernel
+
+HEIGHT_STD = 0.3
+"""m, of one look at the ground's height: taken at every tick, it is a soft hold and no new fact each time."""
+STALE_SAMPLES = 50
+"""So many identical samples, and a sensor counts as stuck: a live one has noise in every sample."""
+STALE_INERTIAL_SAMPLES = 5
+"""The same in flight for accelerometer and gyroscope, on which the next samples of the flight depend."""
+
+
+@kernel
+def passes(f: Filter, sensor: int, ratio: float) -> bool:
+    """Book a gate's verdict; ratio: innovation over gate, the largest of the axes (1 is the limit)."""
+    m = f.m
+    m.test_ratio[sensor] = ratio
+    if ratio <= 1.0:
+        m.rejected_in_row[sensor] = 0
+        m.last_used[sensor] = m.time
+        return True
+    m.rejected[sensor] += 1
+    m.rejected_in_row[sensor] += 1
+    return False
+
+
+@kernel
+def book(f: Filter, sensor: int, squares: float, degrees: int) -> None:
+    """Add to the consistency statistics: normalised innovations squared and their degrees of freedom."""
+    f.m.nis_sum[sensor] += squares
+    f.m.nis_count[sensor] += degrees
+
+
+NINETY_FIVE = 1.959964
+"""Standard deviations within which 95 % of a normal distribution lie."""
+
+
+GARBAGE = 1e6
+"""Standard deviations beyond which, and for what is not a number, a sample is no measurement at all."""
+
+
+@kernel
+def judge(f: Filter, sensor: int, axis: int, innovation: float, variance: float) -> float:
+    """Book an innovation of this variance; returns its size as a part of the gate."""
+    m = f.m
+    normalised = innovation / math.sqrt(variance)
+    if not abs(normalised) < GARBAGE:  # also where it is not a number
+        innovation, normalised = 0.0, GARBAGE
+    m.innovation[sensor, axis] = innovation
+    m.normalised[sensor, axis] = normalised
+    m.seen[sensor] += 1
+    if abs(normalised) < NINETY_FIVE:
+        m.within[sensor] += 1
+    return float(abs(normalised) / f.p.gate[sensor])
+
+
+@kernel
+def ratio_of(f: Filter, sensor: int, axis: int, innovation: float, noise: float) -> float:
+    """`judge` for the present row, which is cleared; noise: variance of the measurement itself."""
+    return float(judge(f, sensor, axis, innovation, predicted_variance(f) + noise))
+
+
+ROUGH = 40.0
+"""Of a live inertial sensor's own noise: what changes from sample to sample so much more is garbage."""
+ROUGHNESS_BLEND = 0.2
+ROUGHEST = 100.0
+"""A single jump, however far, is a knock."""
+LEAST_ACCELEROMETER_NOISE, LEAST_GYROSCOPE_NOISE = 0.3, 0.015
+"""m/s², rad/s: a quieter one would be rough wherever the cable snatches."""
+
+
+@kernel
+def note_sample(f: Filter, sensor: int, measured: Any) -> bool:
+    """Compare a sample with those before; whether the sensor has failed."""
+    m, same, roughest = f.m, True, 0.0
+    for axis in range(3):
+        change = measured[axis] - m.last_sample[sensor, axis]
+        same = same and not abs(change) > 1e-9 * abs(measured[axis])
+        roughest = max(roughest, abs(change - m.last_change[sensor, axis]))
+        m.last_sample[sensor, axis], m.last_change[sensor, axis] = measured[axis], change
+    m.stale_count[sensor] = m.stale_count[sensor] + 1 if same else 0
+    if sensor != MAGNETOMETER:
+        least = LEAST_ACCELEROMETER_NOISE if sensor == ACCELEROMETER else LEAST_GYROSCOPE_NOISE
+        # A second difference of white noise has the standard deviation sqrt(1 + 4 + 1).
+        roughest /= math.sqrt(6.0) * max(f.p.sensor_std[sensor], least)
+        if not roughest < ROUGHEST:  # also where it is not a number
+            roughest = ROUGHEST
+        m.roughness[sensor] += ROUGHNESS_BLEND * (roughest - m.roughness[sensor])
+    return failed(f, sensor)
+
+
+@kernel
+def failed(f: Filter, sensor: int) -> bool:
+    """Whether a sensor repeats itself or, an inertial one, shows garbage; at rest they may repeat."""
+    m = f.m
+    if sensor == MAGNETOMETER:
+        return bool(m.stale_count[sensor] >= STALE_SAMPLES)
+    return bool(
+        m.vehicle_mode == FLYING
+        and (m.stale_count[sensor] >= STALE_INERTIAL_SAMPLES or m.roughness[sensor] > ROUGH)
+    )
+
+
+@kernel
+def saturated(f: Filter, specific_force: float) -> bool:
+    """Whether an axis of the accelerometer is at its limit, where it says nothing but "much"."""
+    return bool(abs(specific_force) >= 0.999 * f.p.accelerometer_range)
+
+
+@kernel
+def accelerometer(f: Filter, measured: Any) -> None:
+    """Specific force, m/s², body: (thrust z_b + R'F_cable) / m_v + R'force + bias; at rest R'g + bias.
+
+    Standing, it shows which way is up. Flying, it shows the cable, and so the load.
+    """
+    p, m = f.p, f.m
+    if note_sample(f, ACCELEROMETER, measured):
+        m.rejected[ACCELEROMETER] += 1
+        return
+    noise = p.sensor_std[ACCELEROMETER] * p.sensor_std[ACCELEROMETER]
+    if m.vehicle_mode == FLYING:
+        noise += p.gust_std * p.gust_std
+    begin(f)
+    worst, squares, used = 0.0, 0.0, 0
+    for axis in range(3):
+        if saturated(f, measured[axis]):
+            continue
+        innovation = measured[axis] - _accelerometer_row(f, axis)
+        worst = max(worst, ratio_of(f, ACCELEROMETER, axis, innovation, noise))
+        used += 1
+    if used < 3:
+        m.rejected[ACCELEROMETER] += 1
+    if not passes(f, ACCELEROMETER, worst):
+        return
+    taut = m.tension > 0.0 and not p.two_way and m.vehicle_mode == FLYING
+    before = along_cable(f)
+    for axis in range(3):
+        if saturated(f, measured[axis]):
+            continue
+        innovation = measured[axis] - _accelerometer_row(f, axis)
+        squares += fuse(f, innovation, noise)
+    inject(f)
+    book(f, ACCELEROMETER, squares, used)
+    if taut:
+        allow_for_slack(f, before)
+
+
+@kernel
+def along_cable(f: Filter) -> float:
+    """Variance of the load's distance, m²."""
+    x, cov, total, square = f.x, f.P, 0.0, 1e-12
+    for i in range(3):
+        square += x[X_LOAD + i] ** 2
+        for j in range(3):
+            total += x[X_LOAD + i] * cov[LOAD + i, LOAD + j] * x[X_LOAD + j]
+    return total / square
+
+
+@kernel
+def allow_for_slack(f: Filter, before: float) -> None:
+    """A cable that was thought taut and is found slack is known to be no longer than that, and no more.
+
+    before: the variance (m²) of its length before the measurement, which is what remains.
+    """
+    x, cov = f.x, f.P
+    cable(f, f.vectors[0])
+    widened = before - along_cable(f)
+    if f.m.tension > 0.0 or widened <= 0.0:
+        return
+    square = x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2
+    for i in range(3):
+        for j in range(3):
+            cov[LOAD + i, LOAD + j] += widened * x[X_LOAD + i] * x[X_LOAD + j] / square
+
+
+@kernel
+def _accelerometer_row(f: Filter, axis: int) -> float:
+    """Write the row of one axis; returns the predicted specific force."""
+    p, x, row, jacobian = f.p, f.x, f.vectors[ROW], f.vectors[0]
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix(x)
+    if axis == 0:
+        a, b, c = r00, r10, r20
+    elif axis == 1:
+        a, b, c = r01, r11, r21
+    else:
+        a, b, c = r02, r12, r22
+    if f.m.vehicle_mode == FLYING:
+        fx, fy, fz = cable(f, jacobian)
+        own = 1.0 / p.vehicle_mass
+        vx, vy, vz = x[X_VELOCITY], x[X_VELOCITY + 1], x[X_VELOCITY + 2]
+        brake = drag_rate(p.vehicle_drag, p.vehicle_mass, vx, vy, vz)
+        wx = fx * own + x[X_FORCE] - brake * vx
+        wy = fy * own + x[X_FORCE + 1] - brake * vy
+        wz = fz * own + x[X_FORCE + 2] - brake * vz
+        lift = f.m.thrust * own if axis == 2 else 0.0
+        row[VELOCITY], row[VELOCITY + 1], row[VELOCITY + 2] = -brake * a, -brake * b, -brake * c
+        row[FORCE], row[FORCE + 1], row[FORCE + 2] = a, b, c
+        for j in range(3):
+            row[LOAD + j] = own * (a * jacobian[j] + b * jacobian[3 + j] + c * jacobian[6 + j])
+            row[LOAD_VELOCITY + j] = own * (a * jacobian[9 + j] + b * jacobian[12 + j] + c * jacobian[15 + j])
+    else:
+        wx, wy, wz, lift = 0.0, 0.0, p.gravity, 0.0
+    # R'w turns with the attitude error as [R'w]x.
+    bx = r00 * wx + r10 * wy + r20 * wz
+    by = r01 * wx + r11 * wy + r21 * wz
+    bz = r02 * wx + r12 * wy + r22 * wz
+    if axis == 0:
+        row[ATTITUDE + 1], row[ATTITUDE + 2] = -bz, by
+    elif axis == 1:
+        row[ATTITUDE], row[ATTITUDE + 2] = bz, -bx
+    else:
+        row[ATTITUDE], row[ATTITUDE + 1] = -by, bx
+    row[ACCEL_BIAS + axis] = 1.0
+    return float(lift + a * wx + b * wy + c * wz + x[X_ACCEL_BIAS + axis])
+
+
+@kernel
+def gyroscope(f: Filter, measured: Any) -> None:
+    """Body rates plus bias, rad/s."""
+    p, m, x = f.p, f.m, f.x
+    limit = p.gyroscope_range * 0.999
+    beyond = abs(measured[0]) >= limit or abs(measured[1]) >= limit or abs(measured[2]) >= limit
+    if note_sample(f, GYROSCOPE, measured) or beyond:
+        m.rejected[GYROSCOPE] += 1
+        return
+    noise = p.sensor_std[GYROSCOPE] * p.sensor_std[GYROSCOPE]
+    begin(f)
+    worst, squares = 0.0, 0.0
+    for axis in range(3):
+        innovation = measured[axis] - x[X_RATES + axis] - x[X_GYRO_BIAS + axis]
+        f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
+        worst = max(worst, ratio_of(f, GYROSCOPE, axis, innovation, noise))
+    suspect_moments(f)
+    # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
+    # widens the rates, it does not refuse what the gyroscope sees for long.
+    if not passes(f, GYROSCOPE, worst):
+        if m.rejected_in_row[GYROSCOPE] < 3 or worst > 0.01 * GARBAGE:
+            return
+        for axis in range(3):
+            f.P[RATES + axis, RATES + axis] += (SUSPECTED_RATES * f.p.sensor_std[GYROSCOPE]) ** 2
+    for axis in range(3):
+        f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
+        squares += fuse(f, m.innovation[GYROSCOPE, axis], noise)
+    inject(f)
+    book(f, GYROSCOPE, squares, 3)
+
+
+MOMENT_BLEND = 0.02
+MOMENT_LIMIT = 0.5
+"""Of the running mean of gyroscope innovations (50 samples), in standard deviations: 5 of its own."""
+SUSPECTED_RATES = 10.0
+"""The gyroscope's standard deviations: how wrong the rates then may be."""
+
+
+@kernel
+def suspect_moments(f: Filter) -> None:
+    """Rates that stay ahead of the model, or behind: a moment acts that the rotor commands do not explain.
+
+    A rotor is weaker than it was, or a load pulls off the centre. The gyroscope then counts for more.
+    """
+    m, cov, half = f.m, f.P, 0.5 * f.p.period
+    unknown = (SUSPECTED_RATES * f.p.sensor_std[GYROSCOPE]) ** 2
+    for axis in range(3):
+        m.turn_suspicion[axis] += MOMENT_BLEND * (m.normalised[GYROSCOPE, axis] - m.turn_suspicion[axis])
+        if abs(m.turn_suspicion[axis]) > MOMENT_LIMIT:
+            # What the moment gave the rates over the last tick, it gave the attitude half of, times the tick.
+            rate, angle = RATES + axis, ATTITUDE + axis
+            cov[rate, rate] += unknown
+            cov[rate, angle] += half * unknown
+            cov[angle, rate] += half * unknown
+            cov[angle, angle] += half * half * unknown
+
+
+@kernel
+def rest(f: Filter) -> None:
+    """Pseudo-measurements of a vehicle that stands: no velocity, no turning, the load at rest too."""
+    x = f.x
+    begin(f)
+    for axis in range(3):
+        f.vectors[ROW, VELOCITY + axis] = 1.0
+        fuse(f, -x[X_VELOCITY + axis], 0.05**2)
+        f.vectors[ROW, RATES + axis] = 1.0
+        fuse(f, -x[X_RATES + axis], 0.02**2)
+        f.vectors[ROW, LOAD_VELOCITY + axis] = 1.0
+        fuse(f, -x[X_LOAD_VELOCITY + axis], 0.05**2)
+    inject(f)
+
+
+@kernel
+def on_ground(f: Filter) -> None:
+    """Pseudo-measurement of a vehicle that stands on the ground: its height."""
+    begin(f)
+    f.vectors[ROW, POSITION + 2] = 1.0
+    fuse(f, f.p.standing_height - f.x[X_POSITION + 2], HEIGHT_STD**2)
+    inject(f)
+
+
+@kernel
+def load_at_rest(f: Filter) -> None:
+    """Pseudo-measurements of a load on the ground: its own velocity is zero, and its height."""
+    p, x = f.p, f.x
+    begin(f)
+    for axis in range(3):
+        f.vectors[ROW, VELOCITY + axis], f.vectors[ROW, LOAD_VELOCITY + axis] = 1.0, 1.0
+        fuse(f, -x[X_VELOCITY + axis] - x[X_LOAD_VELOCITY + axis], 0.1**2)
+    if p.has_ground:
+        f.vectors[ROW, POSITION + 2], f.vectors[ROW, LOAD + 2] = 1.0, 1.0
+        fuse(f, p.lying_height - x[X_POSITION + 2] - x[X_LOAD + 2], HEIGHT_STD**2)
+    inject(f)
+
+
+@kernel
+def magnetometer(f: Filter, measured: Any) -> None:
+    """The heading in a field vector, body, any unit.
+
+    Only the direction of its horizontal part is used: nearby iron then disturbs heading, never roll or pitch.
+    A sample that repeats bit for bit is a stuck sensor.
+    """
+    p, m = f.p, f.m
+    if note_sample(f, MAGNETOMETER, measured):
+        m.rejected[MAGNETOMETER] += 1
+        return
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix(f.x)
+    whole = math.sqrt(measured[0] ** 2 + measured[1] ** 2 + measured[2] ** 2)
+    a = measured[0] - whole * f.x[X_MAG_BIAS]
+    b = measured[1] - whole * f.x[X_MAG_BIAS + 1]
+    x = r00 * a + r01 * b + r02 * measured[2]
+    y = r10 * a + r11 * b + r12 * measured[2]
+    fx, fy, fz = p.field[0], p.field[1], p.field[2]
+    level = fx * fx + fy * fy
+    innovation = -math.atan2(fx * y - fy * x, fx * x + fy * y)
+    # A world rotation d turns the field's horizontal direction by d_z - f_z (f_x d_x + f_y d_y) / f_h².
+    tilt = -fz / level
+    noise = p.sensor_std[MAGNETOMETER] * p.sensor_std[MAGNETOMETER]
+    begin(f)
+    _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
+    if not passes(f, MAGNETOMETER, ratio_of(f, MAGNETOMETER, 0, innovation, noise)):
+        return
+    _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
+    squares = fuse(f, innovation, noise)
+    inject(f)
+    book(f, MAGNETOMETER, squares, 1)
+
+
+@kernel
+def _magnetometer_row(
+    f: Filter,
+    tx: float,
+    ty: float,
+    r00: float,
+    r10: float,
+    r20: float,
+    r01: float,
+    r11: float,
+    r21: float,
+    r02: float,
+    r12: float,
+    r22: float,
+) -> None:
+    row = f.vectors[ROW]
+    row[ATTITUDE] = tx * r00 + ty * r10 + r20
+    row[ATTITUDE + 1] = tx * r01 + ty * r11 + r21
+    row[ATTITUDE + 2] = tx * r02 + ty * r12 + r22
+    # A lasting error e of the field, horizontal, turns what is measured of the heading by -(f x e) / f_h².
+    fx, fy = f.p.field[0], f.p.field[1]
+    level = fx * fx + fy * fy
+    row[MAG_BIAS] = -(fx * r10 - fy * r00) / level
+    row[MAG_BIAS + 1] = -(fx * r11 - fy * r01) / level
+
+
+@kernel
+def barometer(f: Filter, altitude: float) -> None:
+    """Pressure altitude above home, m: height plus the barometer's offset."""
+    p = f.p
+    noise = p.sensor_std[BAROMETER] * p.sensor_std[BAROMETER]
+    innovation = altitude - f.x[X_POSITION + 2] - f.x[X_BARO_OFFSET]
+    begin(f)
+    f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
+    if not passes(f, BAROMETER, ratio_of(f, BAROMETER, 0, innovation, noise)):
+        return
+    f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
+    squares = fuse(f, innovation, noise)
+    inject(f)
+    book(f, BAROMETER, squares, 1)
+
+
+@kernel
+def measured_pull(f: Filter, measured: Any, out: Array) -> float:
+    """The cable's force on the vehicle as the accelerometer alone has it, N, world; returns its size.
+
+    out: (3,) written.
+    """
+    p, x = f.p, f.x
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = matrix(x)
+    a = p.vehicle_mass * (measured[0] - x[X_ACCEL_BIAS])
+    b = p.vehicle_mass * (measured[1] - x[X_ACCEL_BIAS + 1])
+    c = p.vehicle_mass * (measured[2] - x[X_ACCEL_BIAS + 2]) - f.m.thrust
+    vx, vy, vz = x[X_VELOCITY], x[X_VELOCITY + 1], x[X_VELOCITY + 2]
+    brake = p.vehicle_mass * drag_rate(p.vehicle_drag, p.vehicle_mass, vx, vy, vz)
+    out[0] = r00 * a + r01 * b + r02 * c + brake * vx
+    out[1] = r10 * a + r11 * b + r12 * c + brake * vy
+    out[2] = r20 * a + r21 * b + r22 * c + brake * vz
+    return math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])

@@ -1,0 +1,1 @@
+"""The filter's time update: the nominal state over a step, its transition matrix, the covariance."""

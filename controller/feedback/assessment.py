@@ -1,0 +1,76 @@
+"""What the autopilot makes of its feedback besides the state: what touches what, and what can be trusted."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+from controller.ground.telemetry.vehicle_state import VehicleView
+from controller.law.state import Array
+from sitl_bridge.vehicle.description import Vehicle
+
+CONTACT_MARGIN = 0.02
+"""m, above rest, up to which a body that is seen exactly counts as on the ground."""
+LIFTED = 0.05
+"""m, above rest, from which on such a load counts as lifted."""
+
+LOST_LOAD = 1.1
+"""Of the longest that the cable can be, distance at which the load is not on it any more."""
+
+
+class Contact(NamedTuple):
+    """What vehicle and load touch."""
+
+    vehicle_on_ground: bool
+    load_on_ground: bool
+    load_lifted: bool
+    """It hangs, clear of the ground, so that its law can take over"""
+    cable_taut: bool
+    load_attached: bool
+    in_flight: bool
+    """Found flying: not held at its start, nor standing"""
+
+
+class Assessor(Protocol):
+    """Judges a feedback, for an autopilot under ground control."""
+
+    def contact(self, estimate: Array) -> Contact:
+        """What touches what at an estimate (18,), eq. 31."""
+
+    def assess(self, view: VehicleView) -> list[str]:
+        """Write the health of sensors and estimate into the view; what there is to say."""
+
+
+class ExactAssessor:
+    """For feedback that is the truth: geometry says what touches what, and all is well."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        cable = vehicle.cable
+        self._rest_length = cable.rest_length
+        # A cable that is stretched by all that the rotors can pull is as long as one can be.
+        pull = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+        self._lost_length = LOST_LOAD * (cable.rest_length + pull / cable.stiffness)
+        ground = vehicle.ground
+        self._vehicle_rest = self._load_rest = -math.inf
+        if ground is not None:
+            self._vehicle_rest = ground.height - min(leg[2] for leg in vehicle.airframe.legs)
+            self._load_rest = ground.height + vehicle.load.radius
+
+    def contact(self, estimate: Array) -> Contact:
+        """By the distances of the bodies from each other and from the ground."""
+        x = estimate.tolist()
+        length = math.dist(x[0:3], x[3:6])
+        taut = length >= self._rest_length
+        grounded = x[2] < self._vehicle_rest + CONTACT_MARGIN
+        return Contact(
+            vehicle_on_ground=grounded,
+            load_on_ground=x[5] < self._load_rest + CONTACT_MARGIN,
+            load_lifted=taut and x[5] > self._load_rest + LIFTED,
+            cable_taut=taut,
+            load_attached=length <= self._lost_length,
+            in_flight=not grounded and any(x[6:12]),  # held by the plant it would be at rest
+        )
+
+    def assess(self, view: VehicleView) -> list[str]:
+        """Nothing to say."""
+        return []

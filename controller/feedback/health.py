@@ -1,0 +1,58 @@
+"""The estimator as an autopilot under ground control sees it: contacts, health, and quality."""
+
+from __future__ import annotations
+
+import math
+
+from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED
+from controller.feedback.assessment import Contact
+from controller.feedback.estimate import EstimateFeedback
+from controller.feedback.health_notices import HealthWatch, sensors_good
+from controller.ground.telemetry.vehicle_state import EstimateQuality, VehicleView
+from controller.law.state import Array
+
+
+class EstimateAssessor:
+    """Judges the estimate that an autopilot under ground control flies on."""
+
+    def __init__(self, feedback: EstimateFeedback) -> None:
+        self._feedback = feedback
+        self._watch = HealthWatch(feedback.estimator.vehicle.sensors.tracker is not None)
+
+    def contact(self, estimate: Array) -> Contact:
+        """As the filter's models have it: height is not known well enough to go by."""
+        estimator = self._feedback.estimator
+        aligned, load = estimator.aligned, estimator.load_mode
+        has_ground = estimator.tuning.has_ground
+        taut = aligned and load == LOAD_ON_CABLE and estimator.tension > 0.0
+        return Contact(
+            vehicle_on_ground=has_ground and (estimator.grounded or not aligned),
+            load_on_ground=has_ground and (load == LOAD_ON_GROUND or not aligned),
+            load_lifted=taut,
+            cable_taut=taut,
+            load_attached=load != LOAD_RELEASED,
+            in_flight=aligned and estimator.in_flight,
+        )
+
+    def assess(self, view: VehicleView) -> list[str]:
+        """Health and quality into the view; what there is to say."""
+        health = self._feedback.estimator.health()
+        ready = self._feedback.ready() or self._feedback.estimator.flying
+        for name, good in sensors_good(health).items():
+            setattr(view.health, name, good)
+        view.health.attitude = health.attitude
+        view.health.position = health.position and health.velocity and ready
+        view.health.load = health.load or health.load_released or not view.cable_taut
+        ratios = {name: sensor.test_ratio for name, sensor in health.sensors.items()}
+        view.quality = EstimateQuality(
+            velocity=health.velocity,
+            dead_reckoning=health.dead_reckoning,
+            gps_glitch=health.gps_glitch,
+            velocity_ratio=ratios["gps_velocity"],
+            position_ratio=ratios["gps_position"],
+            height_ratio=ratios["barometer"],
+            heading_ratio=ratios["magnetometer"],
+            horizontal_accuracy=health.position_std if health.aligned else math.nan,
+            vertical_accuracy=health.height_std if health.aligned else math.nan,
+        )
+        return self._watch.changes(health) if health.aligned else []

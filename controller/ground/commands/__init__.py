@@ -1,0 +1,1 @@
+"""Commands and set-points: from a message to its one acknowledgement."""

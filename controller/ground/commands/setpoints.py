@@ -1,0 +1,129 @@
+"""Offboard set-points: from SET_POSITION_TARGET_* to one value in the world's frame, masks respected."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
+from sitl_bridge.frames import (
+    DEG_E7_PER_DEG,
+    Geodetic,
+    Triple,
+    enu_to_ned,
+    euler_from_quaternion,
+    yaw_from_heading,
+)
+
+NOTHING: Triple = (math.nan, math.nan, math.nan)
+_POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
+_FORCE, _NO_YAW, _NO_YAW_RATE = 1 << 9, 1 << 10, 1 << 11
+_BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_FRD)
+_AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
+_RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+
+
+class Setpoint(NamedTuple):
+    """What an offboard client asks for: world ENU, SI, yaw anticlockwise from east; NaN where masked."""
+
+    of_load: bool
+    """Of the load; else of the vehicle."""
+    position: Triple
+    velocity: Triple
+    acceleration: Triple
+    yaw: float
+    yaw_rate: float
+
+
+def setpoint_of(
+    message: Any, of_load: bool, profile: Profile, home: Triple, view: VehicleView
+) -> Setpoint | str:
+    """The set-point of SET_POSITION_TARGET_LOCAL_NED or _GLOBAL_INT, or why it cannot be flown."""
+    mask = message.type_mask
+    velocity = _unmasked((message.vx, message.vy, message.vz), mask, _VELOCITY)
+    acceleration = _unmasked((message.afx, message.afy, message.afz), mask, _ACCELERATION)
+    if mask & _FORCE and any(not math.isnan(a) for a in acceleration):
+        return "Force set-points are not supported; send acceleration, or mask it"
+    if message.id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT:
+        found = _global_position(message, mask, profile, home)
+    else:
+        found = _local_position(message, mask)
+    if isinstance(found, str):
+        return found
+    if (
+        message.coordinate_frame in _BODY_FRAMES
+        and message.id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
+    ):
+        velocity, acceleration = (_from_heading_frame(v, view) for v in (velocity, acceleration))
+    else:
+        velocity, acceleration = enu_to_ned(velocity), enu_to_ned(acceleration)
+    heading = math.nan if mask & _NO_YAW else message.yaw
+    turn = math.nan if mask & _NO_YAW_RATE else message.yaw_rate
+    numbers = (*found, *velocity, *acceleration, heading, turn)
+    if any(math.isinf(number) or abs(number) > 1e6 for number in numbers):
+        return "Set-point with a number beyond all bounds; mask what is not meant"
+    if any(math.isnan(p) and math.isnan(v) for p, v in zip(found, velocity, strict=True)):
+        return "Set-point without position or velocity on some axis; unmask one of them on each"
+    yaw = math.nan if math.isnan(heading) else yaw_from_heading(heading)
+    return Setpoint(of_load, found, velocity, acceleration, yaw, -turn)
+
+
+def _unmasked(values: Triple, mask: int, shift: int) -> Triple:
+    x, y, z = (math.nan if mask >> shift + i & 1 else value for i, value in enumerate(values))
+    return (x, y, z)
+
+
+def _local_position(message: Any, mask: int) -> Triple | str:
+    position = _unmasked((message.x, message.y, message.z), mask, _POSITION)
+    if message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED:
+        return enu_to_ned(position)
+    if message.coordinate_frame not in _BODY_FRAMES:
+        frame = f"Set-points in frame {message.coordinate_frame}"
+        return f"{frame} are not supported; use 1 (local NED) or 8 (body, velocity)"
+    if any(not math.isnan(number) for number in position):
+        return "Positions in the body's frame are not supported; send velocity, or use frame 1 (local NED)"
+    return NOTHING
+
+
+def _global_position(message: Any, mask: int, profile: Profile, home: Triple) -> Triple | str:
+    masked = _unmasked((0.0, 0.0, message.alt), mask, _POSITION)
+    if message.coordinate_frame in _AMSL_FRAMES:
+        altitude = masked[2]
+    elif message.coordinate_frame in _RELATIVE_FRAMES:
+        altitude = masked[2] + profile.origin.home.altitude + home[2]
+    else:
+        frame = f"Set-points in frame {message.coordinate_frame}"
+        return f"{frame} are not supported; use 0, 5 (AMSL), 3 or 6 (above home)"
+    point = Geodetic(message.lat_int / DEG_E7_PER_DEG, message.lon_int / DEG_E7_PER_DEG, altitude)
+    north_masked, east_masked = math.isnan(masked[0]), math.isnan(masked[1])
+    east, north, up = profile.origin.local(point)
+    return (math.nan if east_masked else east, math.nan if north_masked else north, up)
+
+
+def _from_heading_frame(v: Triple, view: VehicleView) -> Triple:
+    """Forward, right, down by the vehicle's heading, level: to ENU."""
+    yaw = euler_from_quaternion(view.attitude)[2]
+    c, s = math.cos(yaw), math.sin(yaw)
+    return (v[0] * c + v[1] * s, v[0] * s - v[1] * c, -v[2])
+
+
+class Offboard:
+    """The set-point that counts, and whose it is: one sender at a time, until it falls silent."""
+
+    def __init__(self) -> None:
+        self.latest: Setpoint | None = None
+        self._time = -math.inf
+        self._sender: object = None
+
+    def offer(self, setpoint: Setpoint, sender: object, now: float, timeout: float) -> str:
+        """Take a set-point; returns why not, or an empty string."""
+        if self.fresh(now, timeout) and sender != self._sender:
+            return "Another client has offboard control; stop its set-points first"
+        self.latest, self._time, self._sender = setpoint, now, sender
+        return ""
+
+    def fresh(self, now: float, timeout: float) -> bool:
+        """Whether a set-point came within the last `timeout` seconds."""
+        return now - self._time <= timeout

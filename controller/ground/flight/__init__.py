@@ -1,0 +1,1 @@
+"""Flying under ground control: modes, guidance, missions, failsafes; the target of each moment."""

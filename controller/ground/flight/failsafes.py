@@ -1,0 +1,175 @@
+"""What goes wrong in flight, and what is done about it: docs/failsafes.md says the same in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+from controller.ground.commands.result import CRITICAL, EMERGENCY, WARNING
+from controller.ground.flight.fence import Fence
+from controller.ground.flight.preconditions import tilt
+from controller.ground.parameters.protocol import Parameters
+from controller.ground.telemetry.vehicle_state import VehicleView
+
+
+class Reaction(IntEnum):
+    """In the order of severity: a milder one never takes the place of a harder one."""
+
+    NONE = 0
+    HOLD = 1
+    RETURN = 2
+    LAND = 3
+    TERMINATE = 4
+
+
+class Trigger(NamedTuple):
+    """A condition that has just come up."""
+
+    reaction: Reaction
+    severity: int
+    text: str
+
+
+_LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE}
+_FENCE = {2: Reaction.HOLD, 3: Reaction.RETURN, 4: Reaction.TERMINATE, 5: Reaction.LAND}
+_OFFBOARD = {3: Reaction.RETURN, 4: Reaction.LAND, 5: Reaction.HOLD, 6: Reaction.TERMINATE}
+
+
+class Situation(NamedTuple):
+    """What the failsafes look at besides the view."""
+
+    offboard: bool
+    """In offboard mode"""
+    setpoint_fresh: bool
+    last_station: float | None
+    """When a ground station was last heard, if ever"""
+    armed_at: float
+
+
+SLOW_CHECKS = 0.1
+"""s between two looks at battery, ground stations and geofence"""
+
+
+class Failsafes:
+    """Remembers which conditions hold, so that each is reacted to once, when it comes up."""
+
+    def __init__(self) -> None:
+        self.active: set[str] = set()
+        self._next_slow = -math.inf
+
+    def reset(self) -> None:
+        """Forget everything (disarmed)."""
+        self.active.clear()
+        self._next_slow = -math.inf
+
+    def check(
+        self, view: VehicleView, now: float, situation: Situation, p: Parameters, fence: Fence
+    ) -> list[Trigger]:
+        """Conditions that have come up (or, for the link to the plant, gone) since the last call."""
+        lost = view.hil_age > p["COM_HIL_LOSS_T"]
+        if lost != ("hil" in self.active):
+            self._note("hil", lost)
+            return [_link_to_plant(view, p, lost)]
+        if lost:
+            return []
+        fast = (
+            ("flight", not (view.in_reach and tilt(view) <= math.radians(p["FD_FAIL_TILT"]))),
+            ("estimate", not (view.health.attitude and view.health.position)),
+            ("offboard", situation.offboard and not situation.setpoint_fresh),
+        )
+        conditions: tuple[tuple[str, bool], ...] = fast
+        if now >= self._next_slow:
+            self._next_slow = now + SLOW_CHECKS
+            conditions = (*fast, *_slow(view, now, situation, p, fence))
+        triggers = []
+        for name, holds in conditions:
+            if holds != (name in self.active):
+                self._note(name, holds)
+                if holds:
+                    triggers.append(_REACTIONS[name](view, p, fence))
+        return triggers
+
+    def _note(self, name: str, holds: bool) -> None:
+        (self.active.add if holds else self.active.discard)(name)
+
+
+def _slow(
+    view: VehicleView, now: float, situation: Situation, p: Parameters, fence: Fence
+) -> tuple[tuple[str, bool], ...]:
+    left, heard, timeout = view.battery_remaining, situation.last_station, p["COM_DL_LOSS_T"]
+    # A station that was lost before arming is no loss: this flight was begun without it.
+    gone = heard is not None and heard >= situation.armed_at - timeout and now - heard > timeout
+    return (
+        ("battery low", left < p["BAT_LOW_THR"]),
+        ("battery critical", left < p["BAT_CRIT_THR"]),
+        ("battery emergency", left < p["BAT_EMERGEN_THR"]),
+        ("station", gone and p.integer("NAV_DLL_ACT") != 0),
+        ("fence", p.integer("GF_ACTION") != 0 and bool(fence.outside(view.position))),
+    )
+
+
+def _link_to_plant(view: VehicleView, p: Parameters, lost: bool) -> Trigger:
+    action = p.integer("COM_HIL_LOSS_ACT")
+    if lost:
+        reaction = Reaction.TERMINATE if action == 4 else Reaction.NONE
+        return Trigger(reaction, CRITICAL, f"No sensor data for {view.hil_age:.1f} s: link to the plant lost")
+    return Trigger(Reaction.HOLD if action == 1 else Reaction.NONE, WARNING, "Sensor data are back")
+
+
+def _flight(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    return Trigger(Reaction.TERMINATE, EMERGENCY, "Flight failed (FD_FAIL_TILT): rotors stopped")
+
+
+def _estimate(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    return Trigger(Reaction.LAND, CRITICAL, "Position estimate lost: landing")
+
+
+def _offboard(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    reaction = _OFFBOARD[p.integer("COM_OBL_RC_ACT")]
+    return Trigger(
+        reaction, WARNING, f"No offboard set-point for {p['COM_OF_LOSS_T']:g} s: {_word(reaction)}"
+    )
+
+
+def _station(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    reaction = _LINK.get(p.integer("NAV_DLL_ACT"), Reaction.NONE)
+    return Trigger(reaction, WARNING, f"No ground station for {p['COM_DL_LOSS_T']:g} s: {_word(reaction)}")
+
+
+def _geofence(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    reaction = _FENCE.get(p.integer("GF_ACTION"), Reaction.NONE)
+    return Trigger(reaction, CRITICAL, f"Vehicle {fence.outside(view.position)}: {_word(reaction)}")
+
+
+def _battery(severity: int, word: str, reactions: dict[int, Reaction]) -> _Maker:
+    def make(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+        reaction = reactions.get(p.integer("COM_LOW_BAT_ACT"), Reaction.NONE)
+        text = f"Battery at {100 * view.battery_remaining:.0f} %: {word}, {_word(reaction)}"
+        return Trigger(reaction, severity, text)
+
+    return make
+
+
+_Maker = Callable[[VehicleView, Parameters, Fence], Trigger]
+_REACTIONS: dict[str, _Maker] = {
+    "flight": _flight,
+    "estimate": _estimate,
+    "offboard": _offboard,
+    "station": _station,
+    "fence": _geofence,
+    "battery low": _battery(WARNING, "low", {}),
+    "battery critical": _battery(CRITICAL, "critical", {2: Reaction.LAND, 3: Reaction.RETURN}),
+    "battery emergency": _battery(EMERGENCY, "emergency", {2: Reaction.LAND, 3: Reaction.LAND}),
+}
+
+
+def _word(reaction: Reaction) -> str:
+    return {
+        Reaction.NONE: "warning only",
+        Reaction.HOLD: "holding",
+        Reaction.RETURN: "returning",
+        Reaction.LAND: "landing",
+        Reaction.TERMINATE: "rotors stopped",
+    }[reaction]

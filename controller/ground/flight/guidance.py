@@ -1,0 +1,379 @@
+"""From the ground into the air, through the modes in flight, and down again: the target of each moment.
+
+What is controlled in flight is the load, one cable length below the vehicle; points that clients ask for are
+the vehicle's unless addressed to the load.
+"""
+
+from __future__ import annotations
+
+import math
+from enum import Enum, auto
+from typing import Protocol
+
+from controller.ground.commands.result import INFO, WARNING
+from controller.ground.commands.setpoints import Setpoint
+from controller.ground.flight.ascent import Ascent, Step
+from controller.ground.flight.descent import Descent
+from controller.ground.flight.descent import Step as DescentStep
+from controller.ground.flight.fence import Fence, fence_around
+from controller.ground.flight.geometry import (
+    above,
+    below,
+    controlled_body,
+    hanging_under,
+    limited_speed,
+    limited_velocity,
+    stopping_point,
+    too_deep,
+)
+from controller.ground.flight.mission_flight import MissionFlight, Then
+from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.return_home import ReturnHome
+from controller.ground.flight.setpoint_types import Body, Follow, Goto, Idle, Target
+from controller.ground.missions import mission_plan as plan
+from controller.ground.parameters.protocol import Parameters
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
+from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
+
+_STAY_AT_FLOOR = 0.3
+"""m above the room that a stop needs, within which a body that stops at the floor goes on to"""
+
+
+class Stage(Enum):
+    """How far the vehicle is off the ground."""
+
+    GROUND = auto()
+    ASCENT = auto()
+    FLYING = auto()
+    DESCENT = auto()
+
+
+class Pilot(Protocol):
+    """Who has the mode."""
+
+    mode: Mode
+
+    def set_mode_to(self, mode: Mode) -> None:
+        """Have another mode from now on, of guidance's own accord."""
+
+    def enter(self, mode: Mode) -> None:
+        """Change the mode as a request would; in flight it begins now."""
+
+    def say(self, severity: int, text: str) -> None:
+        """A STATUSTEXT to everybody."""
+
+
+class Guidance:
+    """The stages of one flight after another, and where each mode takes it."""
+
+    def __init__(
+        self, profile: Profile, parameters: Parameters, mission: MissionFlight, pilot: Pilot
+    ) -> None:
+        self.stage = Stage.GROUND
+        self.home: Triple | None = None
+        """m ENU, where the vehicle stood when it was armed last"""
+        self.takeoff_height = math.nan
+        """m ENU, of the vehicle, that a take-off was asked for; NaN: by MIS_TAKEOFF_ALT"""
+        self.speed = math.nan
+        """m/s, horizontal, that was asked for; NaN: the default"""
+        self.landed_at = -math.inf
+        """s of the plant's time, when the last landing was over"""
+        self._profile = profile
+        self._parameters = parameters
+        self._mission = mission
+        self._pilot = pilot
+        self._home_load: Triple = (0.0, 0.0, 0.0)
+        self._ascent: Ascent | None = None
+        self._descent: Descent | None = None
+        self._return: ReturnHome | None = None
+        self._point: Triple = (0.0, 0.0, 0.0)
+        """m, of `_point_of` in HOLD and while waiting"""
+        self._point_of = Body.LOAD
+        self._yaw = 0.0
+        self._at_floor = False
+        """The offboard client asks for less height than there may be, and has been told"""
+
+    # Where it begins
+
+    @property
+    def home_or_origin(self) -> Triple:
+        """Home, the world's origin until there is one."""
+        return self.home or (0.0, 0.0, 0.0)
+
+    def home_geodetic(self) -> Geodetic:
+        """The same as latitude, longitude and altitude."""
+        return self._profile.origin.geodetic(self.home_or_origin)
+
+    def fence(self, with_load: bool = True) -> Fence:
+        """The limits around home."""
+        return fence_around(self.home_or_origin, self._parameters, self._profile, with_load)
+
+    def set_home(self, view: VehicleView) -> None:
+        """Home is here."""
+        self.home, self._home_load = view.position, view.load_position
+
+    def _set_home_below(self, view: VehicleView) -> None:
+        """Home is on the ground under a vehicle that was found in the air."""
+        self.home = self._home_load = (view.position[0], view.position[1], self._profile.ground_height)
+
+    def begin(self, view: VehicleView) -> None:
+        """Armed: on the ground, or in the air already."""
+        self.set_home(view)
+        self.stage = Stage.GROUND if view.vehicle_on_ground else Stage.FLYING
+        if self.stage is Stage.FLYING:
+            if self._profile.has_ground:
+                self._set_home_below(view)  # heights above home are above the ground
+            self.hold_here(view)
+
+    def end(self) -> None:
+        """Disarmed."""
+        self.stage = Stage.GROUND
+        self._ascent = self._descent = self._return = None
+        self.takeoff_height = math.nan
+
+    # What is asked of it
+
+    @property
+    def load_is_down(self) -> bool:
+        """Whether a landing has set the load down, so that only a take-off gets it up again."""
+        return self.stage is Stage.DESCENT and self._descent is not None and not self._descent.hangs
+
+    def hold_here(self, view: VehicleView) -> None:
+        """Come to rest, and stay."""
+        x, y, z = stopping_point(view, self._parameters)
+        least = min(self._floor(view), self._height(view))
+        self._stay_at((x, y, max(z, least)), controlled_body(view))
+        self._yaw = euler_from_quaternion(view.attitude)[2]
+        self.speed = math.nan
+
+    def go_to(self, vehicle: Triple | None, yaw: float, speed: float, view: VehicleView) -> None:
+        """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is."""
+        if vehicle is not None:
+            self._stay_at(self._controlled(vehicle, view), controlled_body(view))
+        self._yaw = self._yaw if math.isnan(yaw) else yaw
+        self.speed = speed
+
+    def ask_takeoff_height(self, altitude: float, view: VehicleView) -> None:
+        """Height (vehicle, m ENU) of the take-off to come or under way; NaN: the default, or as it is."""
+        if self.stage is not Stage.ASCENT or self._ascent is None:
+            self.takeoff_height = altitude
+        elif not math.isnan(altitude):
+            self._ascent.change_height(self.height_of_takeoff(altitude, view))
+
+    def break_off_landing(self) -> None:
+        """Fly on, if the load still hangs; one that lies is picked up by a take-off."""
+        if self.stage is Stage.DESCENT and not self.load_is_down:
+            self.stage = Stage.FLYING
+            self._descent = None
+
+    def start(self, mode: Mode) -> None:
+        """Begin a mode in flight, from where the vehicle holds."""
+        self.speed = math.nan
+        self._return = None
+        self._at_floor = False
+        if mode is Mode.MISSION:
+            self._mission.start()
+
+    def take_off(self, view: VehicleView) -> None:
+        """Leave the ground, to the height that was asked for or that the mission begins with."""
+        altitude = self.takeoff_height
+        if self._pilot.mode is Mode.MISSION:
+            items = self._mission.items
+            first = next((item for item in items if item.command in plan.WITH_POSITION), None)
+            if first is not None and first.command == plan.TAKEOFF:
+                altitude = plan.place(first, self._profile, self.home_geodetic())[2]
+        height = self.height_of_takeoff(altitude, view)
+        if height > self._asked_height(altitude) + 0.01 and self.home is not None:
+            above = f"{height - self.home[2]:.1f} m"
+            self._pilot.say(INFO, f"Taking off to {above}, so that the load leaves the ground")
+        self._ascent = Ascent(height, self._parameters["MPC_TKO_SPEED"], self._profile, view)
+        self._yaw = euler_from_quaternion(view.attitude)[2]
+        self.stage = Stage.ASCENT
+
+    def _asked_height(self, altitude: float) -> float:
+        home = self.home_or_origin
+        return home[2] + self._parameters["MIS_TAKEOFF_ALT"] if math.isnan(altitude) else altitude
+
+    def height_of_takeoff(self, altitude: float, view: VehicleView | None) -> float:
+        """Of the vehicle, m ENU: as asked (NaN: by MIS_TAKEOFF_ALT), or as high as the load needs."""
+        fence = self.fence(view is None or view.load_attached)
+        return max(self._asked_height(altitude), fence.home[2] + fence.least_height)
+
+    # Where to go now
+
+    def target(self, view: VehicleView, setpoint: Setpoint | None, last: Target) -> Target:
+        """Off the ground: what to do now. `setpoint`: the offboard client's; `last`: the target before."""
+        if self._point_of is Body.LOAD and not view.load_attached:
+            self._go_on_without_load()
+        if self.stage is Stage.ASCENT and self._ascent is not None:
+            target = self._ascent.target(view)
+            self._after_ascent(self._ascent, view)
+            return target
+        if self.stage is Stage.DESCENT and self._descent is not None:
+            return self._descend(self._descent, view, last)
+        return self._fly(view, setpoint, last)
+
+    def _after_ascent(self, ascent: Ascent, view: VehicleView) -> None:
+        done, mode = ascent.step is Step.DONE, self._pilot.mode
+        if mode is Mode.LAND:
+            self._land(view, view.load_position)
+        elif done or (
+            ascent.carries and not view.load_on_ground and mode is not Mode.TAKEOFF and self._clear(view)
+        ):
+            self.stage = Stage.FLYING
+            self._ascent = None
+            reached = ascent.target(view)
+            if done:
+                self._stay_at(reached.position, reached.body)
+            else:
+                self._stay_at(stopping_point(view, self._parameters), controlled_body(view))
+            if mode is Mode.TAKEOFF:
+                self._pilot.set_mode_to(Mode.HOLD)
+            self.start(self._pilot.mode)
+
+    def _clear(self, view: VehicleView) -> bool:
+        fence = self.fence(view.load_attached)
+        return view.position[2] >= fence.home[2] + fence.least_height
+
+    def _descend(self, descent: Descent, view: VehicleView, last: Target) -> Target:
+        if self._pilot.mode not in (Mode.LAND, Mode.RTL):  # with the load down: `break_off_landing`
+            self._pilot.say(INFO, "Landing broken off: taking off again")
+            self.take_off(view)
+            return last
+        target = descent.target(view)
+        if descent.step is DescentStep.DONE:
+            self.stage = Stage.GROUND
+            self.landed_at = view.time
+            self._pilot.set_mode_to(Mode.HOLD)
+            self._pilot.say(INFO, "Landed")
+            return Idle(True)
+        return target
+
+    def _fly(self, view: VehicleView, setpoint: Setpoint | None, last: Target) -> Target:
+        mode = self._pilot.mode
+        if mode is Mode.LAND:
+            self._land(view, stopping_point(view, self._parameters))
+            return self._descend(self._descent, view, last) if self._descent else self._hold(view)
+        if mode is Mode.RTL:
+            return self._return_home(view)
+        if mode is Mode.MISSION:
+            return self._fly_mission(view)
+        if mode is Mode.OFFBOARD and setpoint is not None:
+            return self._follow(setpoint, view)
+        return self._hold(view)
+
+    def _hold(self, view: VehicleView) -> Goto:
+        speed = limited_speed(self.speed, self._parameters)
+        return Goto(self._point_of, self._point, self._yaw, speed)
+
+    def _stay_at(self, point: Triple, body: Body) -> None:
+        self._point, self._point_of = point, body
+
+    def _go_on_without_load(self) -> None:
+        """The vehicle's point is where it hovered above the load's; it would fall there otherwise."""
+        self._stay_at(above(self._point, self._profile.hover_length), Body.VEHICLE)
+        if self._return is not None:
+            self._return.without_load(self._profile.hover_length)
+
+    def _controlled(self, vehicle: Triple, view: VehicleView) -> Triple:
+        """The controlled body's point for a vehicle's point."""
+        loaded = controlled_body(view) is Body.LOAD
+        return below(vehicle, self._profile.hover_length) if loaded else vehicle
+
+    def _return_home(self, view: VehicleView) -> Target:
+        if self._return is None:
+            self._return = ReturnHome(self.home_or_origin, self._home_load, self._point)
+        if self._return.arrived(view, self._parameters, self._profile):
+            self._land(view, self._return.place(view), self.home_or_origin)
+        self._stay_at(self._return.point, controlled_body(view))
+        return self._hold(view)
+
+    def _land(self, view: VehicleView, place: Triple, stand: Triple | None = None) -> None:
+        p = self._parameters
+        self._ascent = None
+        self._descent = Descent(
+            place,
+            self.home_or_origin[2],
+            p["MPC_LAND_SPEED"],
+            p["MPC_Z_VEL_MAX_DN"],
+            p["LND_BESIDE"],
+            self._profile,
+            view,
+            stand,
+        )
+        self.stage = Stage.DESCENT
+
+    def _fly_mission(self, view: VehicleView) -> Target:
+        hanging = self._profile.hover_length if view.load_attached else 0.0
+        radius = self._parameters["NAV_ACC_RAD"]
+        step = self._mission.advance(view, lambda item: self._place(item, view), hanging, radius)
+        if isinstance(step, Then):
+            self._after_mission(step, view)
+        else:
+            self.go_to(step.point, step.yaw, self._mission.speed, view)
+        return self._hold(view)
+
+    def _place(self, item: plan.Item, view: VehicleView) -> Triple:
+        """Of the vehicle, m: as the item says, or as high as the load needs (where it takes off or lands)."""
+        x, y, z = plan.place(item, self._profile, self.home_geodetic())
+        fence = self.fence(view.load_attached)
+        return (x, y, max(z, fence.home[2] + fence.least_height))
+
+    def _after_mission(self, then: Then, view: VehicleView) -> None:
+        if then is Then.RETURN:
+            self._pilot.enter(Mode.RTL)
+            return
+        if then is Then.LAND:
+            self._pilot.set_mode_to(Mode.LAND)
+            self._land(view, self._point)
+            return
+        if then is Then.LOST:
+            self._pilot.say(WARNING, "Mission stopped: its jumps go in circles; holding")
+            self._mission.pause()
+        elif then is Then.PAUSE:
+            self._pilot.say(INFO, "Mission waits (autocontinue 0); start it again to go on")
+        else:
+            self._pilot.say(INFO, "Mission finished; holding")
+        self._pilot.set_mode_to(Mode.HOLD)
+        self.speed = math.nan
+
+    def _follow(self, asked: Setpoint, view: VehicleView) -> Target:
+        position, velocity = asked.position, limited_velocity(asked.velocity, self._parameters)
+        if view.load_attached is not asked.of_load:  # a lost load's: from above where it would be
+            under = hanging_under(asked.acceleration, self._profile)
+            way = -1.0 if view.load_attached else 1.0
+            x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
+            position = (x, y, z)
+        acceleration = asked.acceleration
+        deep = math.isnan(position[2]) and self._goes_too_deep(velocity[2], view)
+        if deep:
+            position = (position[0], position[1], self._floor(view))
+            velocity, acceleration = (*velocity[:2], 0.0), (*acceleration[:2], math.nan)
+        plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
+        self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
+        body = controlled_body(view)
+        if plain:
+            self._stay_at(position, body)
+            return Goto(body, position, self._yaw, self._parameters["MPC_XY_VEL_MAX"])
+        return Follow(body, position, velocity, acceleration, asked.yaw, asked.yaw_rate)
+
+    def _height(self, view: VehicleView) -> float:
+        """Of the controlled body, m ENU."""
+        return (view.load_position if view.load_attached else view.position)[2]
+
+    def _floor(self, view: VehicleView) -> float:
+        """Least height of the controlled body, m ENU; -inf without a ground."""
+        fence = self.fence(view.load_attached)
+        return self._controlled((0.0, 0.0, fence.home[2] + fence.least_height), view)[2]
+
+    def _goes_too_deep(self, velocity: float, view: VehicleView) -> bool:
+        """Whether a set-point's upward velocity (m/s) has to end at the floor now; says so once."""
+        room = self._height(view) - self._floor(view) - (_STAY_AT_FLOOR if self._at_floor else 0.0)
+        own = (view.load_velocity if view.load_attached else view.velocity)[2]
+        deep = too_deep(velocity, own, room, self._parameters)
+        if deep and not self._at_floor:
+            least = self.fence(view.load_attached).least_height
+            text = f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"
+            self._pilot.say(WARNING, text)
+        self._at_floor = deep
+        return deep

@@ -1,0 +1,206 @@
+"""Flying a plan: which item now, when it is reached, what comes next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from enum import Enum, auto
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.ground.missions.mission_plan import (
+    CHANGE_SPEED,
+    DELAY,
+    JUMP,
+    LAND,
+    LOITER,
+    LOITER_TIME,
+    RETURN,
+    TAKEOFF,
+    WAYPOINT,
+    WITH_POSITION,
+    Item,
+)
+from controller.ground.telemetry.vehicle_state import VehicleView
+from sitl_bridge.frames import Triple, yaw_from_heading
+
+NO_MISSION: int = mavlink.MISSION_STATE_NO_MISSION
+NOT_STARTED: int = mavlink.MISSION_STATE_NOT_STARTED
+ACTIVE: int = mavlink.MISSION_STATE_ACTIVE
+PAUSED: int = mavlink.MISSION_STATE_PAUSED
+COMPLETE: int = mavlink.MISSION_STATE_COMPLETE
+
+MOST_STEPS = 1000
+"""Items without a place that are passed in one go; more are a loop that goes nowhere."""
+AT_REST = 0.3
+"""m/s, of the load at a way-point where it is to stop"""
+
+
+class Then(Enum):
+    """What a plan wants when it has no point to go to."""
+
+    RETURN = auto()
+    LAND = auto()
+    DONE = auto()
+    PAUSE = auto()
+    LOST = auto()
+    """The plan goes in circles without a place to go to."""
+
+
+class Waypoint(NamedTuple):
+    """Where the plan wants the vehicle now."""
+
+    point: Triple | None
+    """m ENU, of the vehicle; None: wait where it is"""
+    yaw: float
+    """rad ENU; NaN: as it is"""
+
+
+class MissionFlight:
+    """The plan's progress. It survives a pause, and starts again at the beginning when it was complete."""
+
+    def __init__(self) -> None:
+        self.replace(())
+
+    def replace(self, items: tuple[Item, ...]) -> None:
+        """A new plan, from its beginning."""
+        self.items = items
+        self.current = 0
+        self.state = NOT_STARTED if items else NO_MISSION
+        self.speed = math.nan
+        """m/s, that the plan asked for; NaN: the default"""
+        self.reached: list[int] = []
+        """Items reached and not yet announced."""
+        self._jumps: dict[int, int] = {}
+        self._since: float | None = None
+        self._here: Triple | None = None
+        """m, where the vehicle was when an item began that only has a height"""
+        self._arrived = False
+
+    def jump(self, seq: int) -> str:
+        """Go on with another item; returns why not, or an empty string."""
+        if not 0 <= seq < len(self.items):
+            return f"Mission item {seq} does not exist; there are {len(self.items)}"
+        if self.state == COMPLETE:
+            self.state = NOT_STARTED
+        self.current = seq
+        self._leave()
+        return ""
+
+    def start(self) -> None:
+        """Begin, or go on after a pause."""
+        if self.state == COMPLETE:
+            self.replace(self.items)
+        self.state = ACTIVE if self.items else NO_MISSION
+        self._since = None
+
+    def pause(self) -> None:
+        """Stay at the item that is current."""
+        if self.state == ACTIVE:
+            self.state = PAUSED
+
+    def advance(
+        self, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
+    ) -> Waypoint | Then:
+        """What to do now. `hanging`: m, the load below the vehicle (0 without); `radius`: m, the default."""
+        for _ in range(MOST_STEPS):
+            if self.current >= len(self.items):
+                self.state = COMPLETE
+                self.current = max(0, len(self.items) - 1)
+                return Then.DONE
+            item = self.items[self.current]
+            if item.command == RETURN:
+                self._complete()
+                return Then.RETURN
+            if item.command == JUMP:
+                self._take_jump(item)
+            elif item.command == CHANGE_SPEED:
+                self.speed = item.p2 if item.p1 in (0, 1) and item.p2 > 0 else self.speed
+                self._next()
+            else:
+                stay = self._fly(item, view, place, hanging, radius)
+                if stay is not None:
+                    return stay
+        return Then.LOST
+
+    def _fly(
+        self, item: Item, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
+    ) -> Waypoint | Then | None:
+        """An item that takes time; None when it is over."""
+        point = self._point(item, view, place)
+        wait = 0.0
+        if item.command == LOITER:
+            wait = math.inf
+        elif item.command in (WAYPOINT, LOITER_TIME, DELAY) and item.p1 > 0:
+            wait = item.p1
+        if point is not None and not self._arrived:
+            last = not any(i.command in WITH_POSITION for i in self.items[self.current + 1 :])
+            own = item.p2 if item.command == WAYPOINT and item.p2 > 0 else radius
+            self._arrived = _is_there(
+                view, point, hanging, own, stop=wait > 0 or last or item.command == LAND
+            )
+        elif point is None:
+            self._arrived = True
+        if self._arrived:
+            self._since = view.time if self._since is None else self._since
+            if view.time - self._since >= wait:
+                return self._over(item)
+        yaw = math.nan if math.isnan(item.p4) or point is None else yaw_from_heading(math.radians(item.p4))
+        return Waypoint(point, yaw)
+
+    def _point(self, item: Item, view: VehicleView, place: Callable[[Item], Triple]) -> Triple | None:
+        """Where the vehicle has to be for an item, m ENU; None: where it is."""
+        if item.has_place:
+            return place(item)
+        if item.command != TAKEOFF:
+            return None
+        if self._here is None:
+            self._here = view.position
+        return (*self._here[:2], place(item)[2])
+
+    def _over(self, item: Item) -> Then | None:
+        self.reached.append(self.current)
+        if item.command == LAND:
+            self._complete()
+            return Then.LAND
+        self._next()
+        if not item.autocontinue and self.current < len(self.items):
+            self.state = PAUSED
+            return Then.PAUSE
+        return None
+
+    def _complete(self) -> None:
+        """The plan's flight ends with this item; it is complete if it is the last."""
+        self.state = COMPLETE if self.current == len(self.items) - 1 else PAUSED
+
+    def _take_jump(self, item: Item) -> None:
+        taken = self._jumps.get(self.current, 0)
+        if item.p2 == -1 or taken < item.p2:
+            self._jumps[self.current] = taken + 1
+            self.current = int(item.p1)
+            self._leave()
+        else:
+            self._jumps[self.current] = 0
+            self._next()
+
+    def _next(self) -> None:
+        self.current += 1
+        self._leave()
+
+    def _leave(self) -> None:
+        self._here = None
+        self._arrived = False
+        self._since = None
+
+
+def _is_there(view: VehicleView, point: Triple, hanging: float, radius: float, stop: bool) -> bool:
+    """Whether vehicle and load are within the radius, and at rest if they are to stop."""
+    if math.dist(view.position, point) > radius:
+        return False
+    if not hanging:
+        return not stop or math.hypot(*view.velocity) < AT_REST
+    below = (point[0], point[1], point[2] - hanging)
+    return math.dist(view.load_position, below) <= radius and (
+        not stop or math.hypot(*view.load_velocity) < AT_REST
+    )

@@ -1,0 +1,351 @@
+"""The mode machine: requests, the vehicle's state and time in; what the law is to do out.
+
+Disarmed, or armed on the ground, the mode is only what will happen next; in the air `guidance` gives each
+mode its target. Requests are judged here, and failsafes change the mode.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from controller.ground.commands.result import EMERGENCY, INFO, OK, WARNING, Notice, Verdict, deny, not_now
+from controller.ground.commands.setpoints import Offboard, Setpoint
+from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
+from controller.ground.flight.fence import Fence
+from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
+from controller.ground.flight.guidance import Guidance, Stage
+from controller.ground.flight.mission_flight import MissionFlight
+from controller.ground.flight.preconditions import arming_faults
+from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.setpoint_types import Idle, Target, Terminate
+from controller.ground.missions import mission_plan as plan
+from controller.ground.missions.mission_plan import Fault, Item
+from controller.ground.parameters.protocol import Parameters
+from controller.ground.telemetry.vehicle_state import Profile, VehicleView
+from sitl_bridge.frames import Geodetic, Triple
+
+_REACTION_MODES = {Reaction.HOLD: Mode.HOLD, Reaction.RETURN: Mode.RTL, Reaction.LAND: Mode.LAND}
+_SEVERITY_OF_MODE = {mode: reaction for reaction, mode in _REACTION_MODES.items()}
+
+
+class Reposition(NamedTuple):
+    """Where to go in HOLD, m and rad ENU; NaN: as it is."""
+
+    of_load: bool
+    position: Triple
+    yaw: float
+    speed: float
+    """m/s"""
+
+
+class Machine:
+    """The state of one vehicle that ground control can change."""
+
+    def __init__(self, profile: Profile, parameters: Parameters) -> None:
+        self.profile = profile
+        self.parameters = parameters
+        self.armed = False
+        self.terminated = False
+        self.mode = Mode.HOLD
+        self.offboard = Offboard()
+        self.mission = MissionFlight()
+        self.failsafes = Failsafes()
+        self.target: Target = Idle(False)
+        self.notices: list[Notice] = []
+        self.view: VehicleView | None = None
+        self._guidance = Guidance(profile, parameters, self.mission, self)
+        self._armed_at = 0.0
+        self._armed_at_view = 0.0
+        """The same on the plant's clock"""
+
+    # What others read
+
+    @property
+    def stage(self) -> Stage:
+        """How far the vehicle is off the ground."""
+        return self._guidance.stage
+
+    @property
+    def home(self) -> Triple | None:
+        """m ENU, where the vehicle was armed last, on the ground if it has one; disarmed, where it is."""
+        return self._guidance.home
+
+    @property
+    def flying(self) -> bool:
+        """Whether the vehicle is off the ground, or on its way."""
+        return self.armed and self.stage is not Stage.GROUND
+
+    @property
+    def fence(self) -> Fence | None:
+        """The limits around home, once there is one."""
+        with_load = self.view is None or self.view.load_attached
+        return None if self.home is None else self._guidance.fence(with_load)
+
+    def home_geodetic(self) -> Geodetic:
+        """Home's latitude, longitude and altitude; the origin's until there is one."""
+        return self._guidance.home_geodetic()
+
+    def arming_faults(self) -> list[str]:
+        """Why the vehicle cannot be armed now."""
+        if self.terminated:
+            return ["the flight was terminated; disarm first"]
+        return arming_faults(self.view, self.parameters, self.fence)
+
+    # Requests
+
+    def arm(self, now: float) -> Verdict:
+        """Arm, if the preconditions hold."""
+        if self.armed and not self.terminated:
+            return OK
+        faults = self.arming_faults()
+        if faults or self.view is None:
+            return not_now("Arming refused: " + "; ".join(faults))
+        self._begin_flight(self.view, now)
+        self.say(INFO, "Armed")
+        return OK
+
+    def resume(self, view: VehicleView, now: float) -> None:
+        """Take over a vehicle that is in the air (the controller was started again in flight), and hold."""
+        self.view = view
+        self._begin_flight(view, now)
+        self.say(WARNING, "Started in flight: holding")
+
+    def _begin_flight(self, view: VehicleView, now: float) -> None:
+        self.armed = True
+        self._armed_at, self._armed_at_view = now, view.time
+        self.failsafes.reset()
+        self._guidance.begin(view)
+
+    def disarm(self, force: bool) -> Verdict:
+        """Disarm: on the ground, or anywhere by force."""
+        if self.armed and self.flying and not force and not self.terminated and self.profile.has_ground:
+            return deny("Disarming refused: in flight; land first, or force it with param2 = 21196")
+        if self.armed:
+            self._disarm("Disarmed" if not self.flying else "Disarmed by force: rotors stopped")
+        self.terminated = False
+        return OK
+
+    def terminate(self) -> Verdict:
+        """Stop the rotors for good."""
+        if not self.armed:
+            return deny("Termination refused: not armed")
+        self._terminate("Flight terminated: rotors stopped")
+        return OK
+
+    def set_mode(self, mode: Mode, now: float) -> Verdict:
+        """Change the mode, now if flying, else as what will happen after arming."""
+        if self.terminated:
+            return deny("Mode refused: the flight was terminated; disarm first")
+        if mode is Mode.MISSION and not self.mission.items:
+            return deny("Mission refused: there is none; upload one first")
+        if mode is Mode.MISSION and (fault := self.check_plan(self.mission.items)) is not None:
+            return deny(f"Mission refused: {fault.text}")
+        if mode is Mode.OFFBOARD and not self._setpoint_fresh(now):
+            return not_now("Offboard refused: no set-points; send them at 2 Hz or more first")
+        if mode is Mode.LAND and not self.profile.has_ground:
+            return deny("Landing refused: this vehicle has no ground under it; use Hold")
+        if mode is Mode.TAKEOFF:
+            return self.takeoff(math.nan)
+        self.enter(mode)
+        return OK
+
+    def takeoff(self, altitude: float) -> Verdict:
+        """Take off, now or when armed, to a height of the vehicle, m ENU; NaN: by MIS_TAKEOFF_ALT."""
+        if self.terminated:
+            return deny("Take-off refused: the flight was terminated; disarm first")
+        if self.flying and self.stage is not Stage.ASCENT and not self._guidance.load_is_down:
+            return not_now("Take-off refused: already flying; send a point to go to instead")
+        fence = self.fence
+        if fence is None or self.view is None:
+            return not_now("Take-off refused: no position yet; start the plant")
+        if math.isinf(altitude):
+            return deny("Take-off refused: the altitude is no number")
+        if not math.isnan(altitude) and altitude <= fence.home[2]:
+            above = altitude - fence.home[2]
+            return deny(f"Take-off refused: {above:.1f} m above home; altitude is above mean sea level")
+        height = self._guidance.height_of_takeoff(altitude, self.view)
+        fault = fence.outside((fence.home[0], fence.home[1], height))
+        if fault:
+            return deny(f"Take-off refused: {fault}")
+        self.enter(Mode.TAKEOFF)
+        self._guidance.ask_takeoff_height(altitude, self.view)
+        return OK
+
+    def reposition(self, where: Reposition, change_mode: bool) -> Verdict:
+        """Go to a point and hold there; what is NaN stays as it is."""
+        view = self.view
+        if self.terminated:
+            return deny("Going there refused: the flight was terminated; disarm first")
+        if view is None or not self.flying:
+            return not_now("Going there refused: not flying; take off first")
+        if self.stage is Stage.ASCENT:
+            return not_now("Going there refused: still taking off; wait until that is done (IN_AIR)")
+        if self._guidance.load_is_down:
+            return not_now("Going there refused: the load is on the ground; take off again first")
+        if not change_mode and self.mode is not Mode.HOLD:
+            return not_now(
+                f"Going there refused: in {self.mode.title}; ask for a change of mode (param2 = 1)"
+            )
+        if any(math.isinf(x) for x in (*where.position, where.yaw)):
+            return deny("Going there refused: position or heading is infinite")
+        here = hanging_load(view, self.profile) if where.of_load else view.position
+        vehicle = self._vehicle_point(filled(where.position, here), where.of_load)
+        stays = all(math.isnan(x) for x in where.position)
+        fault = "" if stays or self.fence is None else self.fence.refuses(vehicle)
+        if fault:
+            return deny(f"Going there refused: {fault}")
+        speed = limited_speed(where.speed, self.parameters)
+        self.enter(Mode.HOLD)
+        self._guidance.go_to(None if stays else vehicle, where.yaw, speed, view)
+        return OK
+
+    def change_speed(self, speed: float) -> Verdict:
+        """Largest horizontal speed until the mode changes, m/s; -1: the default."""
+        largest = self.parameters["MPC_XY_VEL_MAX"]
+        if speed != -1 and not 0 < speed <= largest:
+            return deny(
+                f"Speed {speed:g} m/s refused: use up to {largest:g} (MPC_XY_VEL_MAX), or -1 for the default"
+            )
+        self._guidance.speed = self.mission.speed = math.nan if speed == -1 else speed
+        return OK
+
+    def offer(self, setpoint: Setpoint, sender: object, now: float) -> str:
+        """An offboard set-point; returns why it is not taken, or an empty string."""
+        fence = self.fence
+        if fence is None or self.view is None:
+            return "Set-point refused: no position yet; start the plant"
+        here = hanging_load(self.view, self.profile) if setpoint.of_load else self.view.position
+        point = self._vehicle_point(filled(setpoint.position, here), setpoint.of_load)
+        asked = any(not math.isnan(x) for x in setpoint.position)
+        low = not math.isnan(setpoint.position[2])
+        fault = (fence.outside(point) if asked else "") or (fence.too_low(point) if low else "")
+        if fault:
+            return f"Set-point refused: {fault}"
+        return self.offboard.offer(setpoint, sender, now, self.parameters["COM_OF_LOSS_T"])
+
+    def check_plan(self, items: tuple[Item, ...]) -> Fault | None:
+        """The first fault of a plan."""
+        return plan.check(items, self.profile, self.home_geodetic(), self._guidance.fence())
+
+    def accept_plan(self, items: tuple[Item, ...]) -> Fault | None:
+        """Take a plan, or say why not."""
+        if self.armed and self.mode is Mode.MISSION:
+            return Fault(14, "it is being flown; pause it first")  # MAV_MISSION_DENIED
+        fault = self.check_plan(items)
+        if fault is None:
+            self.mission.replace(items)
+        return fault
+
+    def set_current_item(self, seq: int) -> Verdict:
+        """Go on with another item of the plan."""
+        fault = self.mission.jump(seq)
+        return deny(fault) if fault else OK
+
+    # Time
+
+    def update(self, view: VehicleView, now: float, last_station: float | None) -> Target:
+        """What the law is to do now. The same object as before if nothing has changed."""
+        self.view = view
+        if not self.armed:
+            if view.health.position and view.in_reach and view.hil_age < math.inf:
+                self._guidance.set_home(view)
+            target: Target = Idle(False)
+        else:
+            self._react(view, now, last_station)
+            lost = "hil" in self.failsafes.active
+            target = self.target if lost and not self.terminated and self.armed else self._step(view, now)
+        if target != self.target and not _same(target, self.target):
+            self.target = target
+        return self.target
+
+    def _react(self, view: VehicleView, now: float, last_station: float | None) -> None:
+        if self.stage is Stage.GROUND or self.terminated or self.home is None:
+            return
+        situation = Situation(
+            self.mode is Mode.OFFBOARD, self._setpoint_fresh(now), last_station, self._armed_at
+        )
+        fence = self._guidance.fence(view.load_attached)
+        for trigger in self.failsafes.check(view, now, situation, self.parameters, fence):
+            self.say(trigger.severity, trigger.text)
+            if trigger.reaction is Reaction.TERMINATE:
+                self._terminate("")
+            elif trigger.reaction > _SEVERITY_OF_MODE.get(self.mode, Reaction.NONE):
+                ground = self.profile.has_ground or trigger.reaction is not Reaction.LAND
+                self.enter(_REACTION_MODES[trigger.reaction] if ground else Mode.HOLD)
+
+    def _step(self, view: VehicleView, now: float) -> Target:
+        if self.terminated:
+            return Terminate()
+        if self.stage is Stage.GROUND:
+            self._on_ground(view, now)
+        if not self.armed:
+            return Idle(False)
+        if self.stage is Stage.GROUND:
+            return Idle(True)
+        return self._guidance.target(view, self.offboard.latest, self.target)
+
+    def _on_ground(self, view: VehicleView, now: float) -> None:
+        if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (
+            self.mode is Mode.OFFBOARD and self._setpoint_fresh(now)
+        ):
+            self._guidance.take_off(view)
+            return
+        landed = self._guidance.landed_at >= self._armed_at_view
+        name = "COM_DISARM_LAND" if landed else "COM_DISARM_PRFLT"
+        since = self._guidance.landed_at if landed else self._armed_at_view
+        limit = self.parameters[name]
+        if 0 <= limit < view.time - since:
+            reason = "landed" if landed else f"no take-off within {limit:g} s ({name})"
+            self._disarm(f"Disarmed: {reason}")
+
+    # The mode
+
+    def enter(self, mode: Mode) -> None:
+        """Change the mode; in flight it begins now."""
+        if self.mode is Mode.MISSION and mode is not Mode.MISSION:
+            self.mission.pause()
+        again = mode is self.mode and mode not in (Mode.HOLD, Mode.RTL)
+        self.set_mode_to(mode)
+        if mode not in (Mode.LAND, Mode.RTL):
+            self._guidance.break_off_landing()
+        if self.view is not None and self.armed and self.stage is Stage.FLYING and not again:
+            self._guidance.hold_here(self.view)
+            self._guidance.start(mode)
+
+    def set_mode_to(self, mode: Mode) -> None:
+        """Have another mode, and say so."""
+        if mode is not self.mode:
+            self._guidance.takeoff_height = math.nan  # it was asked of the mode that is left
+            self.mode = mode
+            self.say(INFO, f"Mode: {mode.title}")
+
+    def _vehicle_point(self, point: Triple, of_load: bool) -> Triple:
+        return above(point, self.profile.hover_length) if of_load else point
+
+    def _setpoint_fresh(self, now: float) -> bool:
+        return self.offboard.fresh(now, self.parameters["COM_OF_LOSS_T"])
+
+    def _disarm(self, text: str) -> None:
+        self.armed = False
+        self._guidance.end()
+        self.mission.pause()
+        self.failsafes.reset()
+        self.mode = Mode.HOLD
+        self.say(INFO, text)
+
+    def _terminate(self, text: str) -> None:
+        self.terminated = True
+        self.mode = Mode.TERMINATION
+        self.mission.pause()
+        if text:
+            self.say(EMERGENCY, text)
+
+    def say(self, severity: int, text: str) -> None:
+        """A STATUSTEXT to everybody."""
+        self.notices.append(Notice(severity, text))
+
+
+def _same(a: Target, b: Target) -> bool:
+    """Equal, a NaN counting as equal to a NaN."""
+    return type(a) is type(b) and repr(a) == repr(b)

@@ -1,0 +1,1 @@
+"""Bytes between ground control and the vehicle: sockets, peers, signing, queues, framing."""

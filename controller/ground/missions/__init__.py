@@ -1,0 +1,1 @@
+"""Plans: the transfer protocol, and what mission items mean."""

@@ -1,0 +1,1 @@
+"""Parameters: their table, the protocol, and the file that keeps them."""

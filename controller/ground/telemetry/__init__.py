@@ -1,0 +1,1 @@
+"""What the vehicle tells ground control: messages from the state that the control loop sees."""

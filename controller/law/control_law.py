@@ -1,0 +1,188 @@
+"""The control law: integral LQR on the load's position (or the vehicle's, alone), one pure step.
+
+u = u* - K·[x - x*; v] - sum of K_past·(u_past - u*_past), v = the integral of (p_p - p_ref): eqs. 54 to 56,
+corrected, with the loop's delay; where rotors lag, also - K_lag·(what they give now - u*). It knows nothing
+of HIL: an estimate and a reference go in, thrust and moments come out.
+
+The reference enters through the integrator alone, x* staying where the vehicle was when the law was engaged
+(the paper's integral LQR: with a raw step that moved x* it would diverge), as a feasible motion that moves x*
+and u*, or, without an integrator, as x* itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.law.flatness import BODY, STENCIL, flat_motion
+from controller.law.reference import path_derivatives
+from controller.law.state import STATE_SIZE, WRENCH_SIZE, Array
+from sitl_bridge.compiled import kernel
+from sitl_bridge.ids import ACTUATOR_CONTROLS
+
+LONGEST_DELAY = 64
+"""Most ticks of loop delay that a design can predict over."""
+
+INTEGRATOR, FEEDFORWARD, STATE = 0, 1, 2
+"""How the reference enters: through the integrator alone, as a feasible motion, or as x* itself."""
+
+DESIGN = np.dtype(
+    [
+        ("entry", "i8"),
+        ("controlled", "i8"),  # where in the state the position is that the reference is for: load or vehicle
+        ("period", "f8"),  # s
+        ("state_gain", "f8", (WRENCH_SIZE, STATE_SIZE)),
+        ("lag_gain", "f8", (WRENCH_SIZE, WRENCH_SIZE)),  # on the wrench that lagging rotors give
+        ("integral_gain", "f8", (WRENCH_SIZE, 3)),
+        ("past_gain", "f8", (LONGEST_DELAY, WRENCH_SIZE, WRENCH_SIZE)),
+        ("delay", "i8"),  # ticks
+        ("lead_time", "f8"),  # s from a command to the middle of its effect
+        ("lag_decay", "f8"),  # share of the rotors' lag that is left after a period
+        ("anti_windup", "f8", (3, WRENCH_SIZE)),
+        ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
+        ("hover_wrench", "f8", WRENCH_SIZE),
+        ("body", BODY),
+    ]
+)
+
+MEMORY = np.dtype(
+    [
+        ("integral", "f8", 3),  # v, m s
+        ("last_error", "f8", 3),  # m, of the tick before
+        ("anchor", "f8", 3),  # m, where the load was when the law was engaged
+        ("past", "f8", (LONGEST_DELAY, WRENCH_SIZE)),  # deviations from u*, newest first
+        ("rotors", "f8", WRENCH_SIZE),  # deviation that lagging rotors give now
+        ("ticks", "i8"),  # steps since the law was engaged
+    ]
+)
+
+WORK = np.dtype(
+    [
+        ("reference", "f8", 3),  # p_ref, m
+        ("deviation", "f8", STATE_SIZE),  # x - x*
+        ("desired", "f8", STATE_SIZE),  # x*
+        ("integral", "f8", 3),  # v, m s, in the heading's frame
+        ("feedforward", "f8", WRENCH_SIZE),  # u*
+        ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
+        ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
+        ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
+        ("heading", "f8", 2),  # cosine and sine of the reference's yaw
+        ("stencil", STENCIL),
+    ]
+)
+"""Scratch and results of one step."""
+
+Design = NDArray[np.void]
+Memory = NDArray[np.void]
+Work = NDArray[np.void]
+Law = tuple[Design, NDArray[np.void], NDArray[np.void], Memory, Work]
+"""A law in flight: design, allocation, reference path, memory and scratch."""
+
+
+def engaged_memory(load_position: Array) -> Memory:
+    """Memory (1,) of a law that takes over now, the load being at `load_position` (m)."""
+    memory = np.zeros(1, dtype=MEMORY)
+    memory["anchor"] = load_position
+    return memory
+
+
+@kernel
+def _turn(cosine: float, sine: float, vector: Array) -> None:
+    """Turn a vector (3,) about the vertical."""
+    x, y = vector[0], vector[1]
+    vector[0], vector[1] = cosine * x - sine * y, sine * x + cosine * y
+
+
+@kernel
+def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, work: Any) -> None:
+    """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s).
+
+    The model is linear about a yaw of zero: its x axis is the heading, and horizontal deviations are turned
+    into that frame. Roll and pitch are towards the heading anyway.
+    """
+    work.heading[0], work.heading[1] = math.cos(path.yaw), math.sin(path.yaw)
+    if design.entry == FEEDFORWARD:
+        # What is commanded now acts after the delay and the rotors' lag, held for a period.
+        flat_motion(
+            design.body,
+            path,
+            t,
+            design.lead_time,
+            work.heading,
+            work.stencil,
+            work.desired,
+            work.feedforward,
+        )
+        for axis in range(3):
+            work.reference[axis] = work.desired[design.controlled + axis]
+    else:
+        path_derivatives(path, t, work.stencil.derivatives)
+        for i in range(STATE_SIZE):
+            work.desired[i] = design.hover_state[i]
+        for k in range(WRENCH_SIZE):
+            work.feedforward[k] = design.hover_wrench[k]
+        for axis in range(3):
+            work.reference[axis] = work.stencil.derivatives[0, axis]
+            origin = work.reference[axis] if design.entry == STATE else memory.anchor[axis]
+            work.desired[axis] += origin
+            work.desired[3 + axis] += origin
+        work.desired[17] = path.yaw
+    for i in range(STATE_SIZE):
+        work.deviation[i] = estimate[i] - work.desired[i]
+    for i in range(0, 12, 3):  # both positions, both velocities
+        _turn(work.heading[0], -work.heading[1], work.deviation[i : i + 3])
+    yaw = STATE_SIZE - 1
+    work.deviation[yaw] -= 2.0 * math.pi * math.floor(work.deviation[yaw] / (2.0 * math.pi) + 0.5)
+
+
+@kernel
+def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> None:
+    """One step: work.wrench = u for this estimate (18,), eq. 31; integrates the load's error into memory.
+
+    path: the reference, see `reference`; time runs from the step that engaged the law.
+    """
+    deviation(design, memory, path, memory.ticks * design.period, estimate, work)
+    for axis in range(3):
+        error = estimate[design.controlled + axis] - work.reference[axis]
+        if memory.ticks > 0:  # trapezoidal rule between the samples
+            memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
+        memory.last_error[axis] = error
+        work.integral[axis] = memory.integral[axis]
+    _turn(work.heading[0], -work.heading[1], work.integral)
+    memory.ticks += 1
+    for k in range(WRENCH_SIZE):
+        u = work.feedforward[k]
+        for i in range(STATE_SIZE):
+            u -= design.state_gain[k, i] * work.deviation[i]
+        for axis in range(3):
+            u -= design.integral_gain[k, axis] * work.integral[axis]
+        for j in range(WRENCH_SIZE):
+            u -= design.lag_gain[k, j] * memory.rotors[j]
+            for age in range(design.delay):
+                u -= design.past_gain[age, k, j] * memory.past[age, j]
+        work.wrench[k] = u
+
+
+@kernel
+def remember(design: Any, memory: Any, work: Any) -> None:
+    """After allocation: what the rotors really give is remembered, and the integrator does not wind up.
+
+    Anti-windup by back-calculation: the part of u that did not fit is taken out of the integral.
+    """
+    oldest = design.delay - 1
+    for k in range(WRENCH_SIZE):
+        under_way = work.achieved[k] - work.feedforward[k]
+        acting = memory.past[oldest, k] if design.delay > 0 else under_way
+        memory.rotors[k] = design.lag_decay * memory.rotors[k] + (1.0 - design.lag_decay) * acting
+        for age in range(oldest, 0, -1):
+            memory.past[age, k] = memory.past[age - 1, k]
+        memory.past[0, k] = under_way
+    for axis in range(3):
+        for k in range(WRENCH_SIZE):
+            work.integral[axis] += design.anti_windup[axis, k] * (work.achieved[k] - work.wrench[k])
+    _turn(work.heading[0], work.heading[1], work.integral)
+    for axis in range(3):
+        memory.integral[axis] = work.integral[axis]

@@ -1,0 +1,138 @@
+"""Feed-forward: the motion of the vehicle, its attitude and thrust that belong to a motion of the load.
+
+The load's position is a flat output: its acceleration says how hard and which way the cable pulls, hence
+where the vehicle is; the vehicle's acceleration says how hard and which way it thrusts, hence its attitude.
+Time derivatives along the path are central differences over a few milliseconds, exact to the path's own
+smoothness; the moments, which an airframe's small inertia makes negligible here, are left to the feedback.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from controller.law.reference import DERIVATIVES, feasible
+from controller.law.state import Array
+from sitl_bridge.compiled import kernel
+from sitl_bridge.vehicle.description import Vehicle
+
+STENCIL_STEP = 2e-3
+"""Spacing of the central differences, s."""
+
+POINTS = 5
+STENCIL = np.dtype(
+    [
+        ("derivatives", "f8", (DERIVATIVES + 1, 3)),
+        ("smooth_step", "f8", DERIVATIVES + 1),
+        ("load", "f8", (POINTS, 3)),  # m
+        ("vehicle", "f8", (POINTS, 3)),  # m
+        ("pull", "f8", (POINTS, 3)),  # N, of the cable on the load
+        ("force", "f8", (POINTS, 3)),  # N, that the rotors have to give
+        ("thrust", "f8", POINTS),  # N
+        ("tilt", "f8", (POINTS, 2)),  # roll and pitch, rad
+    ]
+)
+
+BODY = np.dtype(
+    [
+        ("gravity", "f8"),
+        ("vehicle_mass", "f8"),
+        ("load_mass", "f8"),
+        ("stiffness", "f8"),
+        ("damping", "f8"),
+        ("rest_length", "f8"),
+    ]
+)
+
+
+def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
+    """What the feed-forward needs to know of a vehicle, with its load or alone, SI units."""
+    cable = vehicle.cable
+    record = np.zeros(1, dtype=BODY)
+    record[0] = (
+        vehicle.gravity,
+        vehicle.airframe.mass,
+        vehicle.load.mass if loaded else 0.0,
+        cable.stiffness,
+        cable.damping,
+        cable.rest_length,
+    )
+    out: np.void = record[0]
+    return out
+
+
+@kernel
+def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
+    """Where the vehicle is for the load's derivatives r (6, 3), and how the cable pulls the load.
+
+    Without a load the derivatives are the vehicle's own.
+    """
+    if b.load_mass == 0.0:
+        for i in range(3):
+            load[i] = vehicle[i] = r[0, i]
+            pull[i] = 0.0
+        return
+    squared, slope = 0.0, 0.0
+    for i in range(3):
+        upward = r[2, i] + (b.gravity if i == 2 else 0.0)
+        pull[i] = b.load_mass * upward
+        squared += pull[i] * pull[i]
+        slope += pull[i] * b.load_mass * r[3, i]
+    tension = math.sqrt(squared)
+    # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
+    stretch = tension / b.stiffness - b.damping * (slope / tension) / b.stiffness**2
+    length = b.rest_length + stretch
+    for i in range(3):
+        load[i] = r[0, i]
+        vehicle[i] = r[0, i] + length * pull[i] / tension
+
+
+@kernel
+def flat_motion(
+    b: Any, path: Any, t: float, lead: float, heading: Array, stencil: Any, state: Array, wrench: Array
+) -> None:
+    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path.
+
+    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading.
+    """
+    h = STENCIL_STEP
+    at_rest = not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h
+    first, last = (POINTS // 2, POINTS // 2 + 1) if at_rest else (0, POINTS)
+    for j in range(first, last):
+        feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
+        _hang(b, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
+    for i in range(18):
+        state[i] = 0.0
+    for i in range(3):
+        state[i] = stencil.vehicle[2, i]
+        state[3 + i] = stencil.load[2, i]
+    state[17] = path.yaw
+    wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
+    if at_rest:
+        return
+    for j in range(1, 4):
+        for i in range(3):
+            before, here, after = stencil.vehicle[j - 1, i], stencil.vehicle[j, i], stencil.vehicle[j + 1, i]
+            acceleration = (before - 2.0 * here + after) / (h * h)
+            stencil.force[j, i] = b.vehicle_mass * acceleration + stencil.pull[j, i]
+        stencil.force[j, 2] += b.vehicle_mass * b.gravity
+        east, north, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
+        x, y = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east
+        stencil.thrust[j] = math.sqrt(x * x + y * y + z * z)
+        stencil.tilt[j, 0] = -math.asin(y / stencil.thrust[j])
+        stencil.tilt[j, 1] = math.atan2(x, z)
+    for i in range(3):
+        state[6 + i] = (stencil.vehicle[3, i] - stencil.vehicle[1, i]) / (2.0 * h)
+        state[9 + i] = (stencil.load[3, i] - stencil.load[1, i]) / (2.0 * h)
+    roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
+    roll_rate = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
+    pitch_rate = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
+    # Body rates from Euler rates (eq. 14).
+    upright = math.cos(pitch) * path.yaw_rate
+    state[12] = roll_rate - math.sin(pitch) * path.yaw_rate
+    state[13] = math.cos(roll) * pitch_rate + math.sin(roll) * upright
+    state[14] = -math.sin(roll) * pitch_rate + math.cos(roll) * upright
+    state[15], state[16] = roll, pitch
+    wrench[0] = stencil.thrust[2] + lead * (stencil.thrust[3] - stencil.thrust[1]) / (2.0 * h)

@@ -1,0 +1,170 @@
+"""Where the load is to be: set-points and circles as smooth motions with all their derivatives.
+
+A path is one flat record, so that compiled code evaluates it at every tick. `raw` gives the position that
+the paper feeds to its integrator, steps and all; `feasible` leaves the start smoothly, so that a feed-forward
+can follow it exactly. A path can also be given moment by moment (`local_path`), by somebody who shapes it as
+the flight goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.law.state import Array
+from sitl_bridge.compiled import kernel
+
+DERIVATIVES = 5
+"""Derivatives of a feasible path that are continuous, the position's own not counted."""
+
+PATH = np.dtype(
+    [
+        ("start", "f8", 3),  # m, where a feasible path leaves from, at rest
+        ("centre", "f8", 3),  # m, the set-point, or the circle's centre
+        ("radius", "f8"),  # m, 0 for a set-point
+        ("angular_rate", "f8"),  # rad/s
+        ("ramp_time", "f8"),  # s, in which a feasible path goes over from the start to the path
+        ("yaw", "f8"),  # rad
+        ("yaw_rate", "f8"),  # rad/s
+        ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
+        ("epoch", "f8"),  # s, path time of `motion`
+        ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
+    ]
+)
+
+Path = NDArray[np.void]
+
+# The smooth step: the polynomial of degree 2N+1 from 0 to 1 whose first N derivatives vanish at both ends.
+_SMOOTH_STEP = np.zeros(2 * DERIVATIVES + 2)
+for _k in range(DERIVATIVES + 1):
+    _SMOOTH_STEP[DERIVATIVES + 1 + _k] = (
+        (-1.0) ** _k * math.comb(DERIVATIVES + _k, _k) * math.comb(2 * DERIVATIVES + 1, DERIVATIVES - _k)
+    )
+_BINOMIAL = np.array(
+    [[math.comb(n, k) for k in range(DERIVATIVES + 1)] for n in range(DERIVATIVES + 1)], dtype=np.float64
+)
+
+
+def _peak(order: int) -> float:
+    """Largest magnitude of a derivative of the smooth step over 0..1."""
+    polynomial = np.polynomial.Polynomial(_SMOOTH_STEP).deriv(order)
+    return float(np.max(np.abs(polynomial(np.linspace(0.0, 1.0, 2001)))))
+
+
+PEAK_SPEED = _peak(1)
+PEAK_ACCELERATION = _peak(2)
+
+
+def setpoint(position: tuple[float, float, float], start: tuple[float, float, float]) -> Path:
+    """A path that goes to `position` (m, world) and stays; `start` is where the load is now."""
+    return circle(position, 0.0, 0.0, start)
+
+
+def circle(
+    centre: tuple[float, float, float],
+    radius: float,
+    angular_rate: float,
+    start: tuple[float, float, float],
+) -> Path:
+    """The paper's circle: centre + radius·(sin wt, cos wt, 0), w in rad/s (section V.C). Shape (1,)."""
+    path = np.zeros(1, dtype=PATH)
+    path["start"], path["centre"] = start, centre
+    path["radius"], path["angular_rate"] = radius, angular_rate
+    path["ramp_time"] = _ramp_time(path)
+    return path
+
+
+def local_path() -> Path:
+    """A path (1,) that is the Taylor polynomial of `motion` around `epoch`, which its owner writes."""
+    path = np.zeros(1, dtype=PATH)
+    path["local"] = 1
+    return path
+
+
+LARGEST_SPEED = 5.0
+"""m/s, of the ramp's own share of a feasible motion."""
+LARGEST_ACCELERATION = 2.5
+"""m/s², likewise: a tilt of some 15 degrees."""
+SHORTEST_RAMP = 2.0
+"""s"""
+
+
+def _ramp_time(path: Path) -> float:
+    """How long a feasible path takes from its start to the path itself, s."""
+    begin = np.array([0.0, path["radius"][0], 0.0])
+    distance = float(np.linalg.norm(path["centre"][0] + begin - path["start"][0]))
+    return max(
+        SHORTEST_RAMP,
+        distance * PEAK_SPEED / LARGEST_SPEED,
+        math.sqrt(distance * PEAK_ACCELERATION / LARGEST_ACCELERATION),
+    )
+
+
+@kernel
+def _taylor(motion: Array, t: float, out: Array) -> None:
+    """The motion whose derivatives at 0 are motion (6, 3), and its derivatives at time t (s)."""
+    for i in range(3):
+        for n in range(DERIVATIVES + 1):
+            value = 0.0
+            for k in range(DERIVATIVES, n - 1, -1):
+                value = motion[k, i] + value * t / (k - n + 1)
+            out[n, i] = value
+
+
+@kernel
+def path_derivatives(path: Any, t: float, out: Array) -> None:
+    """The path itself at time t (s): row k of out (6, 3) is its k-th derivative."""
+    if path.local:
+        _taylor(path.motion, t - path.epoch, out)
+        return
+    quarter = 0.5 * math.pi
+    power = path.radius
+    for k in range(DERIVATIVES + 1):
+        phase = path.angular_rate * t + k * quarter
+        out[k, 0] = power * math.sin(phase)
+        out[k, 1] = power * math.cos(phase)
+        out[k, 2] = 0.0
+        power *= path.angular_rate
+    for i in range(3):
+        out[0, i] += path.centre[i]
+
+
+@kernel
+def smooth_step(s: float, out: Array) -> None:
+    """The smooth step at s in 0..1: out (6,) are its value and its derivatives with respect to s."""
+    for k in range(DERIVATIVES + 1):
+        value = 0.0
+        for power in range(2 * DERIVATIVES + 1, k - 1, -1):
+            factor = _SMOOTH_STEP[power]
+            for j in range(k):
+                factor *= power - j
+            value = value * s + factor
+        out[k] = value
+
+
+@kernel
+def feasible(path: Any, t: float, out: Array, scratch: Array) -> None:
+    """The path, left smoothly from its start: row k of out (6, 3) is the k-th derivative at time t (s).
+
+    r = start + w(t)·(path - start), with w the smooth step over the ramp time (Leibniz for its derivatives).
+    scratch: (6,).
+    """
+    path_derivatives(path, t, out)
+    if path.local or t >= path.ramp_time:
+        return
+    smooth_step(max(0.0, t) / path.ramp_time, scratch)
+    scale = 1.0
+    for k in range(DERIVATIVES + 1):
+        scratch[k] *= scale
+        scale /= path.ramp_time
+    for i in range(3):
+        out[0, i] -= path.start[i]
+        for n in range(DERIVATIVES, -1, -1):
+            value = 0.0
+            for k in range(n + 1):
+                value += _BINOMIAL[n, k] * scratch[k] * out[n - k, i]
+            out[n, i] = value
+        out[0, i] += path.start[i]

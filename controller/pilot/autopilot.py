@@ -1,0 +1,56 @@
+"""The autopilot between its links: it arms when it knows where it is, and flies its reference. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from controller.design.catalogue import design
+from controller.feedback.truth import PathFrom
+from controller.hil.ticks import TickReader
+from controller.law.allocation import allocation
+from controller.law.control_law import WORK, Law, engaged_memory
+from controller.law.control_step import control_step
+from controller.law.state import LOAD_POSITION, Array
+from sitl_bridge.mavlink.framing import Frame
+from sitl_bridge.vehicle.description import Vehicle
+
+
+class Autopilot:
+    """Control law and allocation of one vehicle; `controls` (16,) are its rotor commands, 0..1."""
+
+    def __init__(
+        self, vehicle: Vehicle, design_name: str, rate_hz: float, path_from: PathFrom, controls: Array
+    ) -> None:
+        self.armed = False
+        self.law: Law | None = None
+        """While it flies: the arrays of `control_step` in front of estimate and controls."""
+        self._controls = controls
+        self._path_from = path_from
+        self._design = design(design_name, vehicle, rate_hz)
+        self._allocation = allocation(vehicle)
+        self._step: Callable[[], int] | None = None
+
+    def attend(self, reader: TickReader) -> None:
+        """The estimate is all that the law needs."""
+
+    def disarm(self) -> None:
+        """Stop the rotors; the next step arms and starts afresh."""
+        self.armed = False
+        self._step = None
+        self.law = None
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """Anything else from the plant has no effect."""
+
+    def step(self, estimate: Array, time_usec: int, now: float) -> None:
+        """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
+        if self._step is None:
+            load = estimate[LOAD_POSITION]
+            path = self._path_from((float(load[0]), float(load[1]), float(load[2])))
+            law = (self._design, self._allocation, path, engaged_memory(load), np.zeros(1, dtype=WORK))
+            self._step = control_step.bind(*law, estimate, self._controls)
+            self.law = law
+            self.armed = True
+        self._step()

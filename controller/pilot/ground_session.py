@@ -1,0 +1,66 @@
+"""What a controller under ground control needs beside the HIL link, put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from controller.design.client import DesignProcess
+from controller.feedback.assessment import Assessor
+from controller.law.state import Array
+from controller.pilot.ground_link import GroundLink, GroundOptions
+from controller.pilot.ground_piloted import GuidedAutopilot
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.vehicle.description import Vehicle
+
+LONGEST_WAIT = 0.02
+"""s, between two looks at the sockets when the plant is silent"""
+
+
+class Guided:
+    """Ground-control link, background designer and autopilot of one vehicle."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        rate_hz: float,
+        instance: int,
+        options: GroundOptions | None,
+        say: Callable[[str], None],
+        assessor: Assessor | None = None,
+    ) -> None:
+        """Raises OSError when a port is taken, KeyFileError for a key that is none."""
+        self._vehicle = vehicle
+        self._assessor = assessor
+        self._rate_hz = rate_hz
+        self._link = GroundLink(vehicle, instance, options or GroundOptions(), say)
+        self._designer = DesignProcess(vehicle, rate_hz)
+        self._packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
+        self._pilot: GuidedAutopilot | None = None
+
+    def autopilot(self, controls: Array) -> GuidedAutopilot:
+        """The autopilot around its rotor commands (16,)."""
+        self._pilot = GuidedAutopilot(
+            self._vehicle, self._rate_hz, self._link.station, self._designer, controls, self._assessor
+        )
+        return self._pilot
+
+    def next_deadline(self, now: float) -> float:
+        """When ground control wants attention, if the plant says nothing before."""
+        return min(self._link.station.next_deadline(now), now + LONGEST_WAIT)
+
+    def to_plant(self, now: float) -> list[bytes]:
+        """Datagrams for the plant: commands of ground control that are for it to carry out."""
+        messages = self._link.station.plant_commands.to_plant(now)
+        return [self._packer.pack(message) for message in messages]
+
+    def exchange(self, now: float, heard: bool) -> None:
+        """Serve ground control; `heard`: whether the plant has said something since the last time."""
+        if not heard and self._pilot is not None:
+            self._pilot.wait(now)
+        self._link.exchange(now)
+
+    def close(self) -> None:
+        """Free the ports, give up what is under way."""
+        self._link.close()
+        self._designer.close()

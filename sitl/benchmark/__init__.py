@@ -1,0 +1,1 @@
+"""How fast it is: measurements beside something that runs in the same minutes."""

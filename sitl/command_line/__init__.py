@@ -1,0 +1,1 @@
+"""The `sitl` command: flags, and what each command does with them."""

@@ -1,0 +1,243 @@
+"""The `sitl` command: `plant`, `controller`, `fly SCENARIO`, `bench`, `paper`."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+from sitl.command_line.arguments import build_parser
+from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
+from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
+from sitl_bridge.process import Speaker, StopRequest
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
+
+if TYPE_CHECKING:
+    from controller.pilot.ground_link import GroundOptions
+    from sitl.flights.scenario import Scenario
+    from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.plant.clocks.lockstep import OnSilence
+    from sitl_bridge.plant.faults.schedule import Faults
+
+
+def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
+    from controller.ground.link.signing import KeyFileError, read_key
+    from controller.pilot.ground_link import GroundOptions
+
+    if arguments.signing_key is not None:
+        try:
+            read_key(arguments.signing_key)
+        except KeyFileError as error:
+            raise DescriptionError("--signing-key", [str(error)]) from None
+    return GroundOptions(
+        arguments.gcs, arguments.onboard, arguments.signing_key, arguments.parameters, arguments.expose
+    )
+
+
+def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
+    from sitl_bridge.mavlink.links import parse_address
+
+    udp_port, tcp_port = HIL_UDP_PORT + arguments.instance, HIL_TCP_PORT + arguments.instance
+    return parse_address(arguments.hil or kind, udp_port, tcp_port)
+
+
+def _what_to_fly(arguments: argparse.Namespace, of_plant: bool = False) -> tuple[Vehicle, Scenario | None]:
+    """Vehicle and scenario of `plant` or `controller`."""
+    overrides = _overrides(arguments)
+    if arguments.scenario is None:
+        return load_vehicle(arguments.vehicle or "paper", overrides), None
+    from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle
+
+    scenario = load_scenario(arguments.scenario)
+    its_vehicle = plant_vehicle if of_plant else scenario_vehicle
+    return its_vehicle(scenario, arguments.vehicle, overrides), scenario
+
+
+def _overrides(arguments: argparse.Namespace) -> list[str]:
+    """--sensors and --set, in this order, so that single figures change the preset."""
+    preset = [] if arguments.sensors is None else [f"sensors.preset={arguments.sensors}"]
+    return [*preset, *arguments.set]
+
+
+class Timing(NamedTuple):
+    """How the plant keeps time."""
+
+    clock: Literal["realtime", "lockstep"]
+    speed: float | None
+    """Times real time; None: as fast as it goes, or real time's own."""
+    on_silence: OnSilence = "wait"
+
+
+AS_PX4_EXPECTS = Timing("lockstep", 1.0)
+"""Of who waits on TCP: its simulator waits for PX4's answer at each tick, and people steer it."""
+
+
+def _timing(arguments: argparse.Namespace, usual: Timing) -> Timing:
+    """What --clock, --speed and --on-silence ask for; `usual` where no clock is chosen."""
+    clock: Literal["realtime", "lockstep"] = arguments.clock or usual.clock
+    for flag, value in (("--speed", arguments.speed), ("--on-silence", arguments.on_silence)):
+        if value is not None and clock != "lockstep":
+            raise DescriptionError(
+                flag, ["goes with --clock lockstep; real time runs at speed 1 and waits for nobody"]
+            )
+    speed = usual.speed if arguments.speed is None and arguments.clock is None else arguments.speed
+    return Timing(clock, speed, arguments.on_silence or usual.on_silence)
+
+
+def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
+    from sitl_bridge.plant.faults.schedule import Faults, checked
+
+    return Faults() if scenario is None else checked(scenario.faults, vehicle)
+
+
+def _plant(arguments: argparse.Namespace) -> int:
+    vehicle, scenario = _what_to_fly(arguments, of_plant=True)
+    hil = _hil_address(arguments, "udpout")
+    timing = _timing(arguments, AS_PX4_EXPECTS if hil.kind == "tcpin" else Timing("realtime", None))
+    from sitl_bridge.plant.run import PlantOptions, run
+
+    speaker = Speaker("plant", events=arguments.until_eof)
+    stop = StopRequest()
+    stop.install(watch_stdin=arguments.until_eof)
+    options = PlantOptions(
+        vehicle=vehicle,
+        hil=hil,
+        clock=timing.clock,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        instance=arguments.instance,
+        speed=timing.speed,
+        duration_s=arguments.duration or (scenario.duration if scenario else None),
+        drop_percent=arguments.drop,
+        on_silence=timing.on_silence,
+        out=arguments.out,
+        faults=_faults_of(scenario, vehicle),
+        load_to=arguments.load_to,
+    )
+    outcome = run(options, speaker, stop)
+    if arguments.json and not arguments.until_eof:
+        print(json.dumps(outcome, indent=2))
+    return FAILED if outcome["failure"] else 0
+
+
+def _controller(arguments: argparse.Namespace) -> int:
+    vehicle, scenario = _what_to_fly(arguments)
+    from controller.run import ControllerOptions, run
+    from sitl.flights.hold import check_design
+    from sitl.flights.scenario import GroundControl, Hover, usual_feedback
+
+    speaker = Speaker("controller", events=False)
+    stop = StopRequest()
+    stop.install(watch_stdin=arguments.until_eof)
+    reference = scenario.reference if scenario else Hover(kind="hover")
+    if isinstance(reference, GroundControl):
+        check_design(arguments.design)
+    options = ControllerOptions(
+        vehicle=vehicle,
+        hil=_hil_address(arguments, "udpin"),
+        design=arguments.design,
+        rate_hz=arguments.rate,
+        path_from=None if isinstance(reference, GroundControl) else reference.path,
+        instance=arguments.instance,
+        duration_s=arguments.duration,
+        drop_percent=arguments.drop,
+        seed=arguments.seed,
+        ground=_ground_options(arguments),
+        feedback=arguments.feedback or usual_feedback(scenario, vehicle),
+        out=arguments.out,
+    )
+    outcome = run(options, speaker, stop)
+    if arguments.json:
+        print(json.dumps(outcome, indent=2))
+    return 0
+
+
+def _fly(arguments: argparse.Namespace) -> int:
+    from sitl.flights.flight import FlightOptions, fly
+    from sitl.flights.hold import check_design, ground_arguments, hold
+    from sitl.flights.report import table, written
+    from sitl.flights.scenario import GroundControl, load_scenario
+
+    timing = _timing(arguments, Timing("realtime", None))
+    scenario = load_scenario(arguments.scenario)
+    options = FlightOptions(
+        scenario_name=arguments.scenario,
+        scenario=scenario,
+        vehicle=arguments.vehicle,
+        overrides=_overrides(arguments),
+        plant_overrides=arguments.plant_set,
+        hil=_hil_address(arguments, "udpout"),
+        clock=timing.clock,
+        speed=timing.speed,
+        on_silence=timing.on_silence,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        design=arguments.design,
+        feedback=arguments.feedback,
+        duration_s=arguments.duration,
+        drop_percent=arguments.drop,
+        instance=arguments.instance,
+        out=arguments.out,
+    )
+    stop = StopRequest()
+    stop.install()
+    if isinstance(scenario.reference, GroundControl):
+        check_design(arguments.design)
+        if arguments.json:
+            raise DescriptionError("--json", ["under ground control there is no summary to print"])
+        options = replace(options, ground=ground_arguments(_ground_options(arguments)))
+        failure = hold(options, stop)
+        if failure:
+            print(f"fly: {failure}", file=sys.stderr, flush=True)
+        return FAILED if failure else 0
+    summary, out = fly(options, stop)
+    if arguments.json:
+        print(json.dumps(summary, indent=2))
+    else:
+        print(table(summary))
+        for file in written(out):
+            print(f"  {file}")
+    if stop:
+        return INTERRUPTED
+    return 0 if summary["settled"] else FAILED
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    from sitl.benchmark.bench import bench, table
+    from sitl.flights.launch import FlightError
+
+    try:
+        results = bench(arguments.repeats)
+    except FlightError as error:
+        print(f"bench: {error}", file=sys.stderr)
+        return FAILED
+    print(json.dumps(results, indent=2) if arguments.json else table(results))
+    return 0
+
+
+def _paper(arguments: argparse.Namespace) -> int:
+    from sitl.studies.paper.run import main as paper
+
+    return paper(arguments.out, arguments.quick)
+
+
+COMMANDS = {"fly": _fly, "plant": _plant, "controller": _controller, "bench": _bench, "paper": _paper}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code."""
+    arguments = build_parser().parse_args(argv)
+    try:
+        code = COMMANDS[arguments.command](arguments)
+    except DescriptionError as error:
+        print(error, file=sys.stderr)
+        return USAGE
+    except OSError as error:
+        what = f"{error.filename}: {error.strerror}" if error.filename else error
+        print(f"sitl {arguments.command}: {what}", file=sys.stderr)
+        return USAGE
+    return code

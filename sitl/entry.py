@@ -1,0 +1,33 @@
+"""Starts the `sitl` command quickly: what has to be settled before the first import of any weight."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import sys
+
+from sitl.exit_codes import INTERRUPTED
+
+
+def main() -> int:
+    """Run the command line; returns the exit code."""
+    # Also where it was inherited as ignored. A command that has more to do at Ctrl-C sets its own.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return _command()
+    except KeyboardInterrupt:
+        print("sitl: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _command() -> int:
+    # Matrices here are of 20 rows: threads of a linear algebra library only wait, and spin while they do.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # What imports build stays; looking through it for garbage again and again is a tenth of the start.
+    gc.disable()
+    from sitl.command_line import commands
+
+    gc.freeze()
+    gc.enable()
+    return commands.main()

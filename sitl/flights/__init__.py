@@ -1,0 +1,1 @@
+"""One flight: scenario, launch, progress, figures, report."""

@@ -1,0 +1,172 @@
+"""One flight: two processes, a progress line, and the report."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from controller.feedback.truth import estimates
+from sitl.flights.launch import Pair, ProgressLine, watch
+from sitl.flights.report import OF_THE_PLANT, clear, write_report
+from sitl.flights.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
+from sitl_bridge.mavlink.links import Address, open_link
+from sitl_bridge.plant.faults.schedule import checked
+from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import Override
+
+MIRRORED: dict[str, Any] = {"udpout": "udpin", "udpin": "udpout", "tcpin": "tcpout", "tcpout": "tcpin"}
+"""Kind of the other end of a link."""
+
+
+@dataclass(frozen=True)
+class FlightOptions:
+    """What `sitl fly` is asked for."""
+
+    scenario_name: str
+    scenario: Scenario
+    vehicle: str | None
+    overrides: Sequence[str]
+    plant_overrides: Sequence[str]
+    hil: Address
+    """The plant's end of the link."""
+    clock: str
+    speed: float | None
+    on_silence: str
+    rate_hz: float
+    seed: int
+    design: str
+    feedback: str | None
+    """None: as usual, see `scenario.usual_feedback`."""
+    duration_s: float | None
+    drop_percent: float
+    instance: int
+    out: Path | None
+    """None: a new folder under runs/; under ground control, no logs."""
+    ground: Sequence[str] = ()
+    """Arguments of the controller for its ground-control links."""
+
+    def command_lines(self) -> tuple[list[str], list[str]]:
+        """Arguments of `sitl plant` and of `sitl controller`."""
+        common = ["--scenario", self.scenario_name, "--rate", repr(self.rate_hz)]
+        common += ["--instance", str(self.instance), "--seed", str(self.seed)]
+        if self.vehicle is not None:
+            common += ["--vehicle", self.vehicle]
+        for override in self.overrides:
+            common += ["--set", override]
+        plant = [*common, "--hil", str(self.hil), "--clock", self.clock]
+        if self.clock == "lockstep":
+            plant += ["--on-silence", self.on_silence]
+        for override in self.plant_overrides:
+            plant += ["--set", override]
+        if self.speed is not None:
+            plant += ["--speed", repr(self.speed)]
+        if self.duration_s is not None:
+            plant += ["--duration", repr(self.duration_s)]
+        plant += ["--drop", repr(self.drop_percent)]
+        if self.out is not None:
+            plant += ["--out", str(self.out)]
+        controller = [*common, "--hil", str(self.other_end), "--design", self.design]
+        if self.feedback is not None:
+            controller += ["--feedback", self.feedback]
+        if self.out is not None:
+            controller += ["--out", str(self.out)]
+        return plant, [*controller, *self.ground]
+
+    @property
+    def other_end(self) -> Address:
+        """The controller's end of the link."""
+        return self.hil._replace(kind=MIRRORED[self.hil.kind])
+
+    def check_port(self) -> None:
+        """Raises OSError, before anything is launched, when somebody has the port of the end that waits.
+
+        A plant would else fly with whoever that is.
+        """
+        waiting = self.hil if self.hil.kind.endswith("in") else self.other_end
+        try:
+            open_link(waiting, lambda text: None).close()
+        except OSError as error:
+            raise OSError(f"{error}; --instance N flies beside others, --hil on another port") from None
+
+    def checked_vehicle(self) -> Vehicle:
+        """The vehicle as the controller is told, once it is sure that the processes take what they are given.
+
+        Raises DescriptionError, before anything is launched.
+        """
+        only_plant = [Override(text, "--plant-set") for text in self.plant_overrides]
+        flown = plant_vehicle(self.scenario, self.vehicle, [*self.overrides, *only_plant])
+        checked(self.scenario.faults, flown)
+        return scenario_vehicle(self.scenario, self.vehicle, self.overrides)
+
+
+def new_folder(folder: Path) -> Path:
+    """Make a folder that was not there before, numbered if need be; returns it."""
+    for name in itertools.chain([folder.name], (f"{folder.name}-{n}" for n in itertools.count(2))):
+        made = folder.with_name(name)
+        with contextlib.suppress(FileExistsError):
+            made.mkdir(parents=True)
+            return made
+    raise AssertionError("numbers do not end")
+
+
+def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path]:
+    """Fly; returns the summary and the output folder, where it is too. Raises DescriptionError, OSError."""
+    scenario = options.scenario
+    vehicle = options.checked_vehicle()
+    options.check_port()
+    if options.out is None:
+        name = f"{Path(options.scenario_name).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+        options = replace(options, out=new_folder(Path("runs") / name))
+    assert options.out is not None
+    options.out.mkdir(parents=True, exist_ok=True)
+    clear(options.out)
+    assert not isinstance(scenario.reference, GroundControl)  # see `sitl.flights.hold`
+    path_from = scenario.reference.path
+    line = ProgressLine(sys.stderr)
+    start = vehicle.initial_load_position
+    reference: list[Any] = []  # made at the first progress event: it needs the autopilot's imports
+
+    def show(event: dict[str, Any]) -> None:
+        import numpy as np
+
+        from sitl.flights.metrics import reference_positions
+
+        if not reference:
+            reference.append(path_from(start))
+        load = np.array(event["load_m"])
+        target = reference_positions(reference[0], np.array([event["time_s"]]))[0]
+        x, y, z = event["load_m"]
+        line.show(
+            f"t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
+            f"error {np.linalg.norm(load - target):7.3f} m   {event['real_time_factor']:.2f} x real time"
+        )
+
+    outcome = watch(Pair(*options.command_lines()), stop, show)
+    line.end()
+    if outcome.failure:
+        print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
+    feedback = options.feedback or usual_feedback(scenario, vehicle)
+    facts = {
+        "scenario": options.scenario_name,
+        "vehicle": vehicle.name,
+        "design": options.design,
+        "feedback": feedback,
+        "seed": options.seed,
+        "clock": options.clock,
+        "rate_hz": options.rate_hz,
+        "completed": bool(outcome.end.get("completed")) and not outcome.failure,
+        "failure": outcome.failure,
+        "launch_to_first_command_s": outcome.launch_to_first_command_s,
+        "first_command_unix_s": outcome.first_command_unix_s,
+        **{key: outcome.end[key] for key in OF_THE_PLANT if key in outcome.end},
+    }
+    path = path_from(start)
+    estimating = vehicle if estimates(feedback, vehicle) else None
+    return write_report(options.out, facts, path, estimating), options.out

@@ -1,0 +1,55 @@
+"""`sitl fly` under ground control: plant and controller run until Ctrl-C, and a person or program flies."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
+
+from sitl.flights.flight import FlightOptions
+from sitl.flights.launch import Pair, ProgressLine, watch
+from sitl.flights.report import clear
+from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle.files import DescriptionError
+
+if TYPE_CHECKING:
+    from controller.pilot.ground_link import GroundOptions
+
+
+def ground_arguments(options: GroundOptions) -> list[str]:
+    """The controller's command line for its ground-control links."""
+    arguments: list[str] = []
+    for flag, ports in (("--gcs", options.stations), ("--onboard", options.onboard)):
+        if ports is not None:
+            arguments += [flag, f"{ports.local}:{ports.peer}"]
+    for flag, file in (("--signing-key", options.signing_key), ("--parameters", options.parameters)):
+        if file is not None:
+            arguments += [flag, str(file)]
+    return [*arguments, "--expose"] if options.exposed else arguments
+
+
+def check_design(design: str) -> None:
+    """Under ground control there is no choice of a design; raises DescriptionError for one."""
+    if design != "default":
+        raise DescriptionError(
+            "--design", [f"{design} does not fly under ground control; weigh the default by LQR_* parameters"]
+        )
+
+
+def hold(options: FlightOptions, stop: StopRequest) -> str | None:
+    """Run both processes until asked to stop; returns what went wrong before that, if something did."""
+    options.checked_vehicle()
+    options.check_port()
+    if options.out is not None:
+        clear(options.out)
+    line = ProgressLine(sys.stderr)
+
+    def show(event: dict[str, Any]) -> None:
+        x, y, z = event["load_m"]
+        line.show(
+            f"t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
+            f"{event['real_time_factor']:.2f} x real time"
+        )
+
+    outcome = watch(Pair(*options.command_lines()), stop, show)
+    line.end()
+    return None if stop else outcome.failure

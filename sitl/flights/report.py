@@ -1,0 +1,191 @@
+"""What a flight leaves behind: summary.json, a picture, and the table at the end."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
+from controller.law.reference import Path as ReferencePath
+from sitl.flights.metrics import SETTLED_WINDOW, Metrics, flight_metrics, reference_positions
+from sitl.json_values import plain
+from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
+from sitl_bridge.plant.log.account import Account
+from sitl_bridge.plant.log.state_log import FILE_NAME
+from sitl_bridge.vehicle.description import Vehicle
+
+SUMMARY_NAME = "summary.json"
+PICTURE_NAME = "flight.png"
+FILES = (SUMMARY_NAME, FILE_NAME, TLOG_NAME, PICTURE_NAME, ESTIMATE_NAME, COVARIANCE_NAME)
+"""Names of everything that a flight leaves in its folder."""
+OF_THE_PLANT = tuple(
+    key for key in Account.__annotations__ if key not in ("completed", "failure", "stopped_by")
+)
+"""Keys of the plant's account that go into the summary as they are; the others `sitl fly` knows better."""
+PROMISED = (*OF_THE_PLANT, *Metrics.__annotations__, "estimate", "picture", "state_log_sha256")
+"""Keys of every summary, however the flight ended: null for what is not known."""
+
+Log = dict[str, NDArray[np.float64]]
+
+
+def clear(out: Path) -> None:
+    """Remove what an earlier flight has left in the folder, so that nothing of it is taken for this one's."""
+    for name in FILES:
+        (out / name).unlink(missing_ok=True)
+
+
+def written(out: Path) -> list[Path]:
+    """What a flight has left in its folder, which was cleared before it."""
+    return [file for name in sorted(FILES) if (file := out / name).exists()]
+
+
+def read_state_log(path: Path) -> Log:
+    """Columns of a state log by name; raises ValueError when the plant did not live to finish it."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path)
+    except pa.ArrowInvalid as error:
+        raise ValueError(f"{path} is not complete: {error}") from None
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def positions(log: Log, body: str) -> NDArray[np.float64]:
+    """Positions (n, 3) of `vehicle` or `load`, m, world."""
+    return np.stack([log[f"{body}_{axis}_m"] for axis in "xyz"], axis=1)
+
+
+def write_report(
+    out: Path, facts: dict[str, Any], path: ReferencePath | None, vehicle: Vehicle | None = None
+) -> dict[str, Any]:
+    """Write summary.json and the picture next to the state log; returns the summary.
+
+    facts: what is known besides the log; path: the reference, None when nothing has flown; vehicle: as the
+    controller was told, where it has left a log of its estimate.
+    """
+    state_log = out / FILE_NAME
+    summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
+    if path is not None and state_log.exists():
+        try:
+            log = read_state_log(state_log)
+        except ValueError as error:
+            summary["failure"] = f"{facts.get('failure')}; {error}"
+            log = {"time_s": np.zeros(0)}
+        if len(log["time_s"]) > 1:
+            reference = reference_positions(path, log["time_s"])
+            metrics = flight_metrics(log["time_s"], positions(log, "load"), reference)
+            summary |= metrics
+            if vehicle is not None and (out / ESTIMATE_NAME).exists():
+                summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
+            draw(out / PICTURE_NAME, log, reference, facts)
+            summary["picture"] = str(out / PICTURE_NAME)
+        summary["state_log"] = str(state_log)
+        summary["state_log_sha256"] = hashlib.sha256(state_log.read_bytes()).hexdigest()
+    summary["settled"] = bool(summary["settled"] and facts.get("completed"))
+    summary = {key: plain(value) for key, value in summary.items()}  # a flight that diverged has no figures
+    text = json.dumps(summary, indent=2, allow_nan=False)
+    (out / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
+    return summary
+
+
+def estimate_report(
+    out: Path, log: Log, reference: NDArray[np.float64], vehicle: Vehicle, rate_hz: float
+) -> dict[str, Any] | None:
+    """`estimate` of the summary, with the bound of the linear filter; None when its log is not complete."""
+    from controller.estimator.riccati_bound import load_relative_bound
+    from controller.feedback.estimate import tuning_for
+    from sitl.flights.estimate_metrics import estimate_metrics
+
+    try:
+        estimates, covariances = (read_state_log(out / name) for name in (ESTIMATE_NAME, COVARIANCE_NAME))
+    except (OSError, ValueError):
+        return None
+    bound = load_relative_bound(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
+    return {
+        **estimate_metrics(log, estimates, covariances, reference),
+        "load_relative_bound_m": bound.tolist(),
+        "estimate_log": str(out / ESTIMATE_NAME),
+        "covariance_log": str(out / COVARIANCE_NAME),
+    }
+
+
+def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, Any]) -> None:
+    """Picture of a flight: load and vehicle against the reference, cable length, rotor speeds."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    time = log["time_s"]
+    load, vehicle = positions(log, "load"), positions(log, "vehicle")
+    figure, axes = plt.subplots(5, 1, figsize=(9, 11), sharex=True, layout="constrained")
+    for index, axis in enumerate("xyz"):
+        ax = axes[index]
+        ax.plot(time, reference[:, index], "k--", lw=1.2, label="reference (load)")
+        ax.plot(time, load[:, index], color="tab:orange", lw=1.8, label="load")
+        ax.plot(time, vehicle[:, index], color="tab:blue", lw=1.2, label="vehicle")
+        ax.set_ylabel(f"{axis} [m]")
+    axes[0].legend(loc="lower right", ncols=3, fontsize="small")
+    axes[3].plot(time, log["cable_length_m"], color="tab:green", lw=1.5)
+    axes[3].set_ylabel("cable length [m]")
+    rotors = [name for name in log if name.startswith("rotor_")]
+    for number, name in enumerate(rotors, 1):
+        axes[4].plot(time, log[name], lw=0.8, label=f"rotor {number}")
+    axes[4].set_ylabel("rotor speed [rad/s]")
+    axes[4].legend(loc="upper right", ncols=min(8, len(rotors)), fontsize="small")
+    axes[4].set_xlabel("time [s]")
+    for ax in axes:
+        ax.grid(alpha=0.3)
+    figure.suptitle(
+        f"{facts['scenario']}: vehicle {facts['vehicle']}, {facts['design']} design, "
+        f"{facts['clock']} at {facts['rate_hz']:g} Hz"
+    )
+    figure.savefig(file, dpi=110)
+    plt.close(figure)
+
+
+def table(summary: dict[str, Any]) -> str:
+    """The few lines at the end of a flight."""
+    rows = [
+        ("settled", _settled(summary)),
+        ("2 % settling time", _with_unit(summary.get("settling_time_2pct_s"), "s", 2)),
+        ("1 cm settling time", _with_unit(summary.get("settling_time_1cm_s"), "s", 2)),
+        ("overshoot", _with_unit(summary.get("overshoot_pct"), "%", 1)),
+        ("steady-state error", _with_unit(_scaled(summary.get("steady_state_error_m"), 1e3), "mm", 3)),
+        ("tracking rms", _with_unit(_scaled(summary.get("tracking_rms_m"), 1e3), "mm", 3)),
+        ("real-time factor", _with_unit(summary.get("real_time_factor"), "", 2)),
+        ("lateness p50 / p99 / max", _lateness(summary.get("lateness_us") or {})),
+        ("late ticks", _with_unit(summary.get("late_ticks"), "", 0)),
+        ("resent ticks", _with_unit(summary.get("resent_ticks"), "", 0)),
+    ]
+    return "\n".join(f"  {name:<26}{value}" for name, value in rows if value)
+
+
+def _settled(summary: dict[str, Any]) -> str:
+    """Whether, and if not, by how much: GPS noise alone can be more than 2 % of a step."""
+    if summary["settled"]:
+        return "yes"
+    error, tolerance = summary.get("largest_error_at_end_m"), summary.get("settled_tolerance_m")
+    if error is None or tolerance is None or error <= tolerance:
+        return "NO"
+    return f"NO: up to {error:.2f} m off in the last {SETTLED_WINDOW:g} s, {tolerance:.2f} m allowed"
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def _with_unit(value: float | None, unit: str, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f} {unit}".rstrip()
+
+
+def _lateness(lateness: dict[str, float | None]) -> str:
+    if lateness.get("p50") is None:
+        return ""
+    return " / ".join(f"{lateness[key]:.0f}" for key in ("p50", "p99", "max")) + " us"

@@ -1,0 +1,122 @@
+"""A scenario: which vehicle flies for how long, and where its load is to be. Small TOML files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+
+from sitl_bridge.plant.faults.schedule import Faults
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import Override, load_vehicle, read_toml, shipped, validated
+from sitl_bridge.vehicle.schema import Section, Vector, quantity
+
+if TYPE_CHECKING:
+    from controller.law.reference import Path
+
+
+class Hover(Section):
+    """The load stays where it is when the flight begins."""
+
+    kind: Literal["hover"]
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import setpoint
+
+        return setpoint(start, start)
+
+
+class Setpoint(Section):
+    """The load goes to a point and stays."""
+
+    kind: Literal["setpoint"]
+    position: Vector = quantity("m", "world ENU")
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import setpoint
+
+        return setpoint(self.position, start)
+
+
+class Circle(Section):
+    """The load goes round: centre + radius·(sin wt, cos wt, 0)."""
+
+    kind: Literal["circle"]
+    centre: Vector = quantity("m", "world ENU")
+    radius: float = quantity("m", "of the circle", gt=0, le=1e3)
+    angular_rate: float = quantity("rad/s", "w", ge=-10, le=10)
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import circle
+
+        return circle(self.centre, self.radius, self.angular_rate, start)
+
+
+class GroundControl(Section):
+    """Ground control says when to arm and where to go."""
+
+    kind: Literal["ground-control"]
+
+
+Overrides = Sequence[str | Override]
+Reference = Annotated[Hover | Setpoint | Circle | GroundControl, Field(discriminator="kind")]
+
+
+class Scenario(Section):
+    """What `sitl fly NAME` flies."""
+
+    description: str = quantity("-", "one line", "")
+    vehicle: str = quantity("-", "name or file of the vehicle")
+    set: tuple[str, ...] = quantity("-", "overrides of the vehicle, KEY=VALUE", ())
+    plant_set: tuple[str, ...] = quantity("-", "overrides that only the plant has, KEY=VALUE", ())
+    duration: float | None = quantity("s", "how long it flies; without it, until it is stopped", None, gt=0)
+    feedback: Literal["truth", "estimate"] | None = quantity(
+        "-", "what the law flies on, if not as usual", None
+    )
+    reference: Reference
+    faults: Faults = Faults()
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return shipped(_folder())
+
+
+def load_scenario(name_or_file: str) -> Scenario:
+    """Load a scenario by shipped name or path; raises DescriptionError with a line for each fault."""
+    source, content = read_toml(name_or_file, _folder(), "scenario")
+    return validated(Scenario, content, source)
+
+
+def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
+    """The scenario's vehicle, with what the command line says on top."""
+    return load_vehicle(vehicle or scenario.vehicle, [*_entries("set", scenario.set), *overrides])
+
+
+def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
+    """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
+    return scenario_vehicle(scenario, vehicle, [*_entries("plant_set", scenario.plant_set), *overrides])
+
+
+def _entries(key: str, texts: Sequence[str]) -> list[Override]:
+    return [Override(text, f"scenario: {key}.{index}") for index, text in enumerate(texts)]
+
+
+def usual_feedback(scenario: Scenario | None, vehicle: Vehicle) -> str:
+    """What a law flies on unless told otherwise: the paper's vehicle on truth, as the paper has it.
+
+    Everything else, and whatever ground control flies, on the estimate from the sensors.
+    """
+    if scenario is not None and scenario.feedback is not None:
+        return scenario.feedback
+    guided = scenario is not None and isinstance(scenario.reference, GroundControl)
+    return "truth" if vehicle.name == "paper" and not guided else "estimate"
+
+
+def _folder() -> Any:
+    return resources.files(__package__) / "scenarios"

@@ -1,0 +1,166 @@
+"""The lockstep clock: simulated time advances when the answer to the tick is in, and never otherwise.
+
+A protocol object without I/O: `receive(datagram, now)`, `to_send(now)`, `next_deadline()`. Over UDP an
+unanswered tick is sent again after a time-out, so loss, duplication, reordering and delay of datagrams
+change how long a run takes and never what happens in it.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from sitl_bridge.plant.clocks.receiver import HilReceiver
+from sitl_bridge.plant.log.notices import Notices
+from sitl_bridge.plant.physics.state import Array
+from sitl_bridge.plant.simulation import Simulation
+
+SHORTEST_TIMEOUT = 0.005
+"""First wait for an answer before a tick is sent again, s; it grows with the answers' usual delay."""
+LONGEST_TIMEOUT = 0.5
+REPEATS_BEFORE_NOTICE = 3
+SILENCE_BEFORE_NOTICE = 1.0
+"""And at least so long without an answer before anything is said, s."""
+
+OnSilence = Literal["wait", "continue"]
+
+
+class Lockstep:
+    """Simulator's side of the lockstep protocol.
+
+    speed: simulated seconds a second at the most, None for as fast as it goes. resend: False on a link that
+    loses nothing (TCP). on_silence: with "continue" a tick without an answer after three repeats is flown
+    with the last controls, and counted.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        notices: Notices,
+        instance: int,
+        speed: float | None = None,
+        resend: bool = True,
+        on_silence: OnSilence = "wait",
+    ) -> None:
+        self.simulation = simulation
+        self.resent_ticks = 0
+        """Ticks that had to be sent again, counted once for each repeat, from the scenario's beginning on."""
+        self.unanswered_ticks = 0
+        """Ticks flown with the last controls because no answer came."""
+        self._receiver = HilReceiver(simulation, notices, instance)
+        self._notices = notices
+        self._pace = None if speed is None else simulation.period / speed
+        self._resend = resend
+        self._on_silence = on_silence
+        self._locked = False  # the autopilot has answered: no tick without an answer from here on
+        self._due = 0.0  # when the current tick is to be sent (again)
+        self._not_before = 0.0  # with a pace: earliest start of the next tick
+        self._sent_at = 0.0
+        self._first_sent_at = 0.0
+        self._repeats = -1  # of the current tick; -1: not sent yet
+        self._usual_delay = SHORTEST_TIMEOUT / 4
+        self._last_controls: Array | None = None  # kept only to fly on with
+
+    @property
+    def finished(self) -> bool:
+        """Whether the scenario is over."""
+        return self.simulation.finished
+
+    def start(self, now: float) -> None:
+        """Begin to freewheel."""
+        self._due = self._not_before = now
+
+    def next_deadline(self) -> float:
+        """When `to_send` has something to do at the latest."""
+        return self._due
+
+    def to_send(self, now: float) -> list[bytes]:
+        """Datagrams that are due."""
+        out = self._receiver.replies
+        if out:
+            self._receiver.replies = []
+        if now < self._due:
+            return out
+        if not self._locked:
+            self._freewheel(now)
+        elif self._repeats >= 0:
+            self._repeat(now)
+        if self.simulation.finished:
+            return out
+        self._repeats += 1
+        self._sent_at = now
+        if self._repeats == 0:
+            self._first_sent_at = now
+        if self._locked:
+            self._due = now + self._timeout()
+            if self._repeats > 0 and not self._resend:
+                return out
+        return [*out, self.simulation.datagram()] if out else [self.simulation.datagram()]
+
+    def receive(self, datagram: bytes, now: float) -> None:
+        """Take a datagram from the autopilot."""
+        if self._repeats == 0 and self._on_silence == "wait" and self.simulation.exchange(datagram):
+            self._answered(now)
+            return
+        answer = self._receiver
+        if not answer.receive(datagram):
+            return
+        if not self._locked:
+            self._lock(now)
+        if self._repeats < 0 or answer.time_usec != self.simulation.time_usec:
+            return  # a duplicate, or an answer that comes too late to matter
+        if self._repeats > 0:
+            self._notices.over("silence", "autopilot answers again")
+        if self._on_silence == "continue":
+            self._last_controls = answer.controls.copy()
+        if answer.armed and not self.simulation.started:
+            self.simulation.begin()
+        self._advance(answer.controls)
+        self._answered(now)
+
+    def _freewheel(self, now: float) -> None:
+        """Until the first answer: time runs at the nominal pace, the vehicle is held."""
+        if self._repeats >= 0:
+            self.simulation.next_tick()
+        self._repeats = -1
+        self._due = max(self._due + self.simulation.period, now)
+
+    def _lock(self, now: float) -> None:
+        self._locked = True
+        self.simulation.heard()
+        if self._repeats >= 0:
+            self._due = self._sent_at + self._timeout()
+
+    def _repeat(self, now: float) -> None:
+        """No answer within the time-out: the same tick goes out again."""
+        silence = self._repeats >= REPEATS_BEFORE_NOTICE
+        if silence and self._on_silence == "continue" and self._last_controls is not None:
+            self.unanswered_ticks += 1
+            self._advance(self._last_controls)
+            self._repeats = -1
+            return
+        if silence and now - self._first_sent_at >= SILENCE_BEFORE_NOTICE:
+            self._notices.once("silence", "no answer from the autopilot: the world waits for it")
+        if self.simulation.started and self._resend:
+            self.resent_ticks += 1
+
+    def _timeout(self) -> float:
+        patience = max(SHORTEST_TIMEOUT, 4.0 * self._usual_delay)
+        if self._repeats > 0:
+            patience *= 2.0 ** min(self._repeats, 16)
+        return min(LONGEST_TIMEOUT, patience)
+
+    def _advance(self, controls: Array) -> None:
+        if self.simulation.started:
+            self.simulation.step(controls)
+        else:
+            self.simulation.next_tick()
+
+    def _answered(self, now: float) -> None:
+        """The current tick is over, the next is due."""
+        if self._repeats == 0:  # an answer to a repeated tick may belong to any of its sendings
+            self._usual_delay += 0.125 * (now - self._sent_at - self._usual_delay)
+        self._repeats = -1
+        self._due = now
+        if self._pace is not None:
+            self._not_before = max(self._not_before + self._pace, now - self._pace)
+            self._due = max(self._not_before, now)

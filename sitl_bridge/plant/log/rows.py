@@ -1,0 +1,69 @@
+"""A row of the state log, as compiled code fills it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl_bridge.compiled import Buffer, entry_point
+from sitl_bridge.plant.physics.dynamics import pull_of
+from sitl_bridge.plant.physics.parameters import PARAMETERS
+from sitl_bridge.plant.physics.state import CABLE_HOLDS, COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
+
+CHUNK_ROWS = 4096
+"""Rows that are kept before they are written out."""
+
+_TIME, _STATE, _LENGTH, _TENSION = 0, 1, 1 + STATE_SIZE, 2 + STATE_SIZE
+_ROTORS = _TENSION + 1
+_FORCE = _ROTORS + MOST_ROTORS
+WIDTH = _FORCE + 6
+
+
+def columns(rotor_count: int) -> list[str]:
+    """Names of the log's columns, with their units."""
+    forces = [f"force_{body}_{axis}_N" for body in ("vehicle", "load") for axis in "xyz"]
+    rotors = [f"rotor_{i + 1}_rad_s" for i in range(rotor_count)]
+    return ["time_s", *COLUMNS, "cable_length_m", "cable_tension_N", *rotors, *forces]
+
+
+@entry_point(
+    Buffer(PARAMETERS, (1,)),
+    Buffer(np.float64, (STATE_SIZE,)),
+    Buffer(np.float64, (INNER_SIZE,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+    Buffer(np.float64, (6,)),
+    Buffer(np.float64, (CHUNK_ROWS, WIDTH)),
+    int,
+    float,
+)
+def fill_row(
+    record: Any,
+    x: Array,
+    inner: Array,
+    command: Array,
+    force: Array,
+    rows: Array,
+    index: int,
+    time_s: float,
+) -> int:
+    """Write one row of the log. Rotors without lag have the speed that is commanded now."""
+    p, row = record[0], rows[index]
+    row[_TIME] = time_s
+    for i in range(STATE_SIZE):
+        row[_STATE + i] = x[i]
+    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
+    length = (ex * ex + ey * ey + ez * ez) ** 0.5
+    row[_LENGTH] = length
+    row[_TENSION] = pull_of(p, x) if inner[CABLE_HOLDS] > 0.0 else 0.0
+    for i in range(MOST_ROTORS):
+        row[_ROTORS + i] = inner[i] if p.time_constant[i] > 0.0 else command[i]
+    for i in range(6):
+        row[_FORCE + i] = force[i]
+    return index + 1
+
+
+def kept_columns(rotor_count: int) -> NDArray[np.int64]:
+    """Which elements of a row belong to `columns`: those of rotors that do not exist are left out."""
+    return np.array([*range(_ROTORS + rotor_count), *range(_FORCE, WIDTH)])

@@ -1,0 +1,240 @@
+"""The physical world: vehicle, cable and load, advanced in fixed steps under held rotor commands. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl_bridge.magnetic import field_at
+from sitl_bridge.plant.physics.battery import (
+    BatteryReading,
+    drained,
+    electric_power,
+    power_coefficients,
+    reading,
+)
+from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
+from sitl_bridge.plant.physics.dynamics import WORK_ROWS, advance, set_rotors
+from sitl_bridge.plant.physics.parameters import parameters, step_count
+from sitl_bridge.plant.physics.state import (
+    CABLE_HOLDS,
+    MOST_ROTORS,
+    REACTIONS_SIZE,
+    STATE_SIZE,
+    STOPPED,
+    Array,
+    initial_inner_state,
+    initial_state,
+)
+from sitl_bridge.plant.sensors.atmosphere import air_pressure
+from sitl_bridge.plant.sensors.gps import GpsFix, GpsReceiver
+from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
+from sitl_bridge.plant.sensors.tracker import LoadTracker
+from sitl_bridge.plant.sensors.truth import measure
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
+
+SCHEDULE = np.dtype(
+    [
+        ("steps", "i8"),  # integration steps of a tick
+        ("step", "f8"),  # s
+        ("force_hold", "i8"),  # steps that a row of the table of forces acts
+        ("wind_hold", "i8"),  # likewise
+        ("home_altitude", "f8"),  # m above mean sea level
+    ]
+)
+"""What stays the same from tick to tick."""
+
+
+class World:
+    """State and what acts on it. `state` is the vector of `plant.state`, world ENU, SI units."""
+
+    def __init__(
+        self, vehicle: Vehicle, rate_hz: float, seed: int, lightest_load: float | None = None
+    ) -> None:
+        """lightest_load: kg, to which `set_load_mass` may go; absent: what is described."""
+        self.vehicle = vehicle
+        self.steps_per_tick = step_count(vehicle, 1.0 / rate_hz, lightest_load)
+        self.step = 1.0 / (rate_hz * self.steps_per_tick)
+        self.state = initial_state(vehicle)
+        self.inner = initial_inner_state(vehicle)
+        self.reactions = np.zeros(REACTIONS_SIZE)
+        self.rotor_speed = np.zeros(MOST_ROTORS)
+        self.trim_controls = trim_controls(vehicle)
+        self.initial_controls = self.trim_controls if vehicle.initial.start == "hover" else STOPPED
+        """What the rotors do until the first command."""
+        self._seed = seed
+        self._record = parameters(vehicle)
+        self._truth = np.zeros(1, dtype=MEASUREMENT)
+        altitude = vehicle.home.altitude
+        slope = air_pressure(altitude + 0.5) - air_pressure(altitude - 0.5)
+        self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
+        self.measurement = self.instruments.reading
+        self._period = 1.0 / rate_hz
+        self._drain = power_coefficients(vehicle, vehicle.battery) if vehicle.battery else ()
+        self._force = HeldForce(vehicle.disturbance, self.step, seed)
+        self._wind = HeldWind(vehicle, self.step, seed)
+        self._controls = np.zeros(MOST_ROTORS)
+        self._speed_share = np.ones(MOST_ROTORS)
+        self._set_rotors = set_rotors.bind(self._record, self._controls, self._speed_share, self.rotor_speed)
+        work = np.zeros((WORK_ROWS, STATE_SIZE))
+        self._advance = advance.bind(
+            self._record,
+            self.state,
+            self.inner,
+            self.rotor_speed,
+            self._force.table,
+            self._wind.table,
+            work,
+        )
+        sensed = (
+            work,
+            np.array(field_at(vehicle.home)),
+            self.reactions,
+            self._truth,
+        )
+        self._measure = measure.bind(
+            self._record, self.state, self.inner, self._force.now, self._wind.now, *sensed
+        )
+        plan = (self.steps_per_tick, self.step, self._force.hold_steps, self._wind.hold_steps, altitude)
+        self._arrays = (
+            self._record,
+            np.array([plan], dtype=SCHEDULE),
+            self.state,
+            self.inner,
+            self._speed_share,
+            self.rotor_speed,
+            self._force.table,
+            self._force.now,
+            self._wind.table,
+            self._wind.now,
+            *sensed,
+            *self.instruments.arrays(),
+        )
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to the initial state, with fresh random streams; in the air with the rotors as in hover."""
+        self.reset_motion()
+        self.reset_sensors()
+
+    def reset_motion(self) -> None:
+        """Bodies, forces and battery back to the initial state; the sensors go on as they are."""
+        self.state[:] = initial_state(self.vehicle)
+        self.inner[:] = initial_inner_state(self.vehicle)
+        self._force.reset(self._seed)
+        self._wind.reset(self._seed)
+        battery = self.vehicle.battery
+        self._charge = battery.charge if battery is not None else 1.0
+        self._speed_share[:] = 1.0
+        self.set_load_mass(None)
+        self.command(self.initial_controls)
+
+    def reset_sensors(self) -> None:
+        """Every sensor works, with fresh random streams; the next tick that is measured is 0 or 1."""
+        sensors = self.vehicle.sensors
+        self.instruments.reset(self._seed)
+        self.gps = GpsReceiver(sensors.gps, self._period, self._seed)
+        self.tracker = None
+        if sensors.tracker is not None:
+            self.tracker = LoadTracker(sensors.tracker, self._period, self._seed)
+
+    def command(self, controls: Sequence[float] | Array) -> None:
+        """Set the rotors: 16 controls of 0..1, proportional to speed; what is not finite means stopped."""
+        self._controls[:] = controls
+        self._set_rotors()
+
+    def advance(self, steps: int) -> None:
+        """Advance by so many integration steps with the rotors held."""
+        force, wind = self._force, self._wind
+        while steps > 0:
+            covered = min(steps, force.steps_left, wind.steps_left)
+            self._advance(
+                force.next_step, wind.next_step, force.hold_steps, wind.hold_steps, covered, self.step
+            )
+            force.advance(covered)
+            wind.advance(covered)
+            steps -= covered
+
+    def arrays(self) -> tuple[NDArray[Any], ...]:
+        """What `tick.exchange` needs of the world, in its order, as it changes."""
+        return self._arrays
+
+    def ticks_left(self, sensor_tick: int) -> int:
+        """How many ticks, the last measured one being `sensor_tick`, need no more than `tick.exchange`."""
+        ticks = min(self.instruments.ticks_left(sensor_tick), self.gps.ticks_left(sensor_tick))
+        if self.tracker is not None:
+            ticks = min(ticks, self.tracker.ticks_left(sensor_tick))
+        for held in (self._force, self._wind):
+            if not held.constant:
+                ticks = min(ticks, (held.steps_left - 1) // self.steps_per_tick)
+        return ticks
+
+    def next_steps(self) -> tuple[int, int]:
+        """Number of the next step in the tables of held forces and winds."""
+        return self._force.next_step, self._wind.next_step
+
+    def flown(self) -> None:
+        """A tick was flown by `tick.exchange`."""
+        if not self._force.constant:
+            self._force.count(self.steps_per_tick)
+        if not self._wind.constant:
+            self._wind.count(self.steps_per_tick)
+
+    def battery(self, duration: float) -> BatteryReading | None:
+        """Draw on the battery for `duration` seconds at the rotors' present speeds; None: there is none."""
+        battery = self.vehicle.battery
+        if battery is None:
+            return None
+        speeds = self.inner[: len(self.vehicle.rotors)].tolist()
+        now = reading(battery, self._charge, electric_power(battery, self._drain, speeds))
+        self._charge = drained(battery, self._charge, now.current, duration)
+        return now
+
+    def set_sensor(self, name: str, doing: int) -> None:
+        """Let a sensor work or fail, see `sensors.instruments`."""
+        if name == "gps":
+            self.gps.doing = doing
+        elif name != "tracker":
+            self.instruments.set(name, doing)
+        elif self.tracker is not None:
+            self.tracker.doing = doing
+
+    def set_rotor(self, index: int, thrust: float) -> None:
+        """Leave a rotor (from 0) a share of its thrust, at the same command."""
+        self._speed_share[index] = math.sqrt(thrust)
+
+    def release_cable(self) -> None:
+        """Join vehicle and load no more."""
+        self.inner[CABLE_HOLDS] = 0.0
+
+    def set_load_mass(self, mass: float | None) -> None:
+        """Change the load's mass, kg; None: as described."""
+        self._record["load_mass"] = self.vehicle.load.mass if mass is None else mass
+
+    def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array, Array]:
+        """Parameter record, state, inner state, commands and force as they change, for a log to read."""
+        return self._record, self.state, self.inner, self.rotor_speed, self._force.now
+
+    def sensed(self) -> tuple[NDArray[Any], NDArray[Any], Array, Array]:
+        """Readings and truth of the sensors, state, and wind at vehicle and load, as they change."""
+        return self.measurement, self._truth, self.state, self._wind.now
+
+    def measure(self, tick: int, held: bool) -> GpsFix | None:
+        """Fill `measurement` from the world as it is at a tick, to be called once for each in turn.
+
+        Returns the GPS fix that arrives at this tick, if any. A held vehicle measures as if it stood.
+        """
+        self._measure(held, self.vehicle.home.altitude)
+        self.instruments.read(tick)
+        return self.gps.sample(tick, self.state)
+
+
+def trim_controls(vehicle: Vehicle) -> tuple[float, ...]:
+    """Controls (16) whose thrust carries vehicle and load without any moment."""
+    largest = np.array([rotor.max_speed for rotor in vehicle.rotors])
+    controls = np.minimum(np.array(hover_rotor_speeds(vehicle)) / largest, 1.0).tolist()
+    return (*controls, *([0.0] * (MOST_ROTORS - len(controls))))

@@ -1,0 +1,308 @@
+"""The vehicle description: airframe, rotors, cable, load, start and surroundings, from one TOML file.
+
+Both processes read the same description, so there is no second copy of any figure. Units are SI,
+the world is ENU with z up, the body FLU; angles are in radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from sitl_bridge.ids import ACTUATOR_CONTROLS
+from sitl_bridge.vehicle.schema import Section, Vector, quantity
+from sitl_bridge.vehicle.sensors import Sensors
+
+SMALLEST_SHARE = 1e-6
+"""Of a rotor in the thrust without moments, against that of rotors that share it evenly."""
+
+
+class Drag(Section):
+    """Drag of a body in air, F = -(k_1 + k_2 |v|) v with v its velocity through the air."""
+
+    linear: float = quantity("N s/m", "k_1, on each axis alike", 0.0, ge=0, le=1e3)
+    quadratic: float = quantity("N s²/m²", "k_2, half of air density times drag area", 0.0, ge=0, le=1e3)
+
+
+class Airframe(Section):
+    mass: float = quantity("kg", "m_v, of the vehicle without load", gt=0, le=1e4)
+    inertia: Annotated[
+        tuple[
+            Annotated[float, Field(gt=0, le=1e5)],
+            Annotated[float, Field(gt=0, le=1e5)],
+            Annotated[float, Field(gt=0, le=1e5)],
+        ],
+        Field(description="principal moments of inertia, body axes", json_schema_extra={"unit": "kg m²"}),
+    ]
+    drag: Drag = Drag()
+    legs: tuple[Vector, ...] = quantity(
+        "m", "points that touch the ground, body FLU, from the centre of mass", (), max_length=8
+    )
+
+
+class Rotor(Section):
+    position: Vector = quantity("m", "of the hub, body FLU, from the centre of mass")
+    direction: Literal["cw", "ccw"] = quantity("-", "seen from above; ccw gives a reaction torque about -z")
+    thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
+    torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
+    max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
+    diameter: float | None = quantity(
+        "m",
+        "of the disc: the battery's drain is momentum theory's; without one, that of c_Q",
+        None,
+        gt=0,
+        le=20,
+    )
+    time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
+
+
+def rotor_effect(rotors: Sequence[Rotor]) -> NDArray[np.float64]:
+    """Thrust and moments about x, y, z (N and N m, body FLU) of a newton of each rotor: (4, n), eq. 13."""
+    columns = []
+    for rotor in rotors:
+        x, y, _ = rotor.position
+        sign = -1.0 if rotor.direction == "ccw" else 1.0
+        columns.append((1.0, y, -x, sign * rotor.torque_coefficient / rotor.thrust_coefficient))
+    return np.array(columns).T
+
+
+class Cable(Section):
+    stiffness: float = quantity("N/m", "k_a of eq. 9", gt=0, le=1e6)
+    damping: float = quantity("N s/m", "c_a of eq. 9", 0.0, ge=0, le=1e5)
+    rest_length: float = quantity("m", "l_0 of eq. 9", gt=0, le=1e3)
+    model: Literal["two-way", "tension-only"] = quantity(
+        "-",
+        "two-way also pushes below its rest length (the paper's); tension-only never does",
+        "tension-only",
+    )
+    breaking_tension: float | None = quantity("N", "more than this, and the cable breaks", None, gt=0)
+
+
+class Load(Section):
+    mass: float = quantity("kg", "m_p", gt=0, le=1e4)
+    radius: float = quantity("m", "height of its centre above the ground that it lies on", 0.0, ge=0, le=10)
+    drag: Drag = Drag()
+
+
+class Ground(Section):
+    """Level ground: compliant, with friction. Its stiffness follows from how far it yields to a resting
+    body."""
+
+    height: float = quantity("m", "world z of the surface", 0.0)
+    sink: float = quantity("m", "how far a body at rest sinks in", 0.003, gt=0, le=0.1)
+    damping_ratio: float = quantity("-", "of a resting body's bounce", 0.7, ge=0, le=2)
+    friction: float = quantity("-", "coefficient of friction under the legs", 0.6, ge=0, le=5)
+    load_friction: float = quantity("-", "coefficient of friction under the load", 0.5, ge=0, le=5)
+
+
+class Turbulence(Section):
+    """Dryden turbulence at low altitude, MIL-F-8785C 3.7.3.4."""
+
+    wind_at_6_m: float = quantity("m/s", "W_20: light 7.7, moderate 15.4, severe 23.1", gt=0, le=60)
+    height: float = quantity("m", "height above ground that sets scale and intensity", 10.0, ge=3, le=300)
+    airspeed: float = quantity("m/s", "V: how fast the frozen field drifts past", 5.0, gt=0, le=100)
+
+
+class Gust(Section):
+    """One 1-cosine gust: from nothing to the peak and back."""
+
+    start: float = quantity("s", "from the start of the scenario", ge=0)
+    duration: float = quantity("s", "from nothing to nothing", gt=0, le=1e3)
+    peak: Vector = quantity("m/s", "air velocity at its height, world ENU, on top of the wind")
+    acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that it meets", "both")
+
+
+class Air(Section):
+    wind: Vector = quantity("m/s", "steady air velocity, world ENU", (0.0, 0.0, 0.0))
+    turbulence: Turbulence | None = None
+    gusts: tuple[Gust, ...] = ()
+
+
+class Battery(Section):
+    """A pack of lithium cells: voltage falls with the charge drawn and with the current."""
+
+    cells: int = quantity("-", "in series", ge=1, le=100)
+    capacity: float = quantity("A h", "charge of the full pack", gt=0, le=1e4)
+    resistance: float = quantity("ohm", "of the whole pack", ge=0, le=10)
+    full_cell_voltage: float = quantity("V", "open circuit, full", 4.2, gt=0, le=10)
+    empty_cell_voltage: float = quantity("V", "open circuit, empty", 3.5, gt=0, le=10)
+    charge: float = quantity("-", "share of the capacity that is left at the start", 1.0, gt=0, le=1)
+    drive_efficiency: float = quantity("-", "rotor shaft power over electric power", 0.75, gt=0, le=1)
+    figure_of_merit: float = quantity("-", "ideal over shaft power, of rotors", 0.6, gt=0, le=1)
+    avionics_power: float = quantity("W", "drawn by everything but the rotors", 5.0, ge=0, le=1e4)
+
+    @model_validator(mode="after")
+    def _falls(self) -> Battery:
+        if self.empty_cell_voltage > self.full_cell_voltage:
+            raise ValueError(
+                f"empty_cell_voltage = {self.empty_cell_voltage:g} V is above "
+                f"full_cell_voltage = {self.full_cell_voltage:g} V; expected a pack whose voltage falls"
+            )
+        return self
+
+
+class Initial(Section):
+    """Start state: hovering above the load at the equilibrium length, or both at rest on the ground.
+
+    On the ground, positions give east and north only, and the vehicle stands at the origin unless told where.
+    """
+
+    start: Literal["hover", "ground"] = quantity(
+        "-", "in the air, or on the legs with a slack cable", "hover"
+    )
+    load_position: Vector = quantity("m", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_position: Vector | None = quantity("m", "world ENU", None)
+    load_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    attitude: Vector = quantity("rad", "roll, pitch, yaw (about X, Y, Z; R = Rz Ry Rx)", (0.0, 0.0, 0.0))
+    body_rates: Vector = quantity("rad/s", "p, q, r, body FLU", (0.0, 0.0, 0.0))
+
+
+class Disturbance(Section):
+    force_std: float = quantity("N", "standard deviation on each axis of a white force", 0.0, ge=0, le=1e4)
+    hold_time: float = quantity("s", "each draw of the white force is held so long", 0.01, gt=0, le=10)
+    acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that the white force acts on", "both")
+
+
+class Loop(Section):
+    delay_ticks: int = quantity("ticks", "the plant applies each command so many ticks later", 0, ge=0, le=64)
+
+
+class Estimation(Section):
+    """What an estimator is to find out besides its usual state; see docs/estimator.md."""
+
+    load_wind: bool = quantity("-", "a slowly varying force on the load, N", False)
+    load_mass: bool = quantity(
+        "-", "the load's mass, of which the description's is then a first guess", False
+    )
+
+
+class Home(Section):
+    """Where the world's origin lies; Zurich by default, as PX4's own simulator has it."""
+
+    latitude: float = quantity("deg", "WGS 84", 47.397742, ge=-89, le=89)
+    longitude: float = quantity("deg", "WGS 84", 8.545594, ge=-180, le=180)
+    altitude: float = quantity("m", "above mean sea level", 488.0, ge=-500, le=9000)
+
+
+class Vehicle(Section):
+    """One vehicle, complete: what the plant simulates and what the autopilot is designed for."""
+
+    name: str = quantity("-", "short name", min_length=1)
+    description: str = quantity("-", "one line, with where the figures come from", "")
+    gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
+    airframe: Airframe
+    rotors: tuple[Rotor, ...] = quantity(
+        "-", "in the order of the actuator controls", min_length=4, max_length=ACTUATOR_CONTROLS
+    )
+    cable: Cable
+    load: Load
+    initial: Initial = Initial()
+    disturbance: Disturbance = Disturbance()
+    ground: Ground | None = None
+    air: Air = Air()
+    battery: Battery | None = None
+    sensors: Sensors = Sensors()
+    loop: Loop = Loop()
+    estimation: Estimation = Estimation()
+    home: Home = Home()
+
+    @model_validator(mode="after")
+    def _can_hover(self) -> Vehicle:
+        available = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in self.rotors)
+        if available <= self.hover_thrust:
+            raise ValueError(
+                f"rotors give {available:.4g} N at full speed, hovering takes {self.hover_thrust:.4g} N"
+            )
+        if self.initial.vehicle_position == self.initial.load_position:
+            raise ValueError("initial.vehicle_position equals initial.load_position: no cable direction")
+        return self
+
+    @model_validator(mode="after")
+    def _can_steer(self) -> Vehicle:
+        effect = rotor_effect(self.rotors)
+        if np.linalg.matrix_rank(effect) < len(effect):
+            raise ValueError(
+                "rotors: they cannot give thrust and all three moments independently; "
+                "expected hubs on all sides, some cw and some ccw, with torque_coefficient > 0"
+            )
+        share = np.linalg.pinv(effect)[:, 0]
+        idle = [str(i) for i in np.flatnonzero(share <= SMALLEST_SHARE / len(share))]
+        if idle:
+            raise ValueError(
+                f"rotors: thrust without moments leaves nothing to {', '.join(idle)}; "
+                "expected hubs on all sides, and as much cw as ccw"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _can_stand(self) -> Vehicle:
+        if self.ground is not None and len(self.airframe.legs) < 3:
+            raise ValueError("airframe.legs: on ground a vehicle needs three or more; expected points in m")
+        if self.ground is None and self.initial.start == "ground":
+            raise ValueError("initial.start = 'ground': there is no [ground] table")
+        if self.ground is not None and self.initial.start == "hover":
+            bodies = (self.initial.load_position, self.initial.vehicle_position or self.initial.load_position)
+            depth = self.ground.height - min(position[2] for position in bodies)
+            if depth > 0.0:
+                raise ValueError(
+                    f"initial: hovering begins {depth:.4g} m below ground.height; expected above"
+                )
+        if self.initial.start == "ground" and self.initial_length > self.cable.rest_length:
+            raise ValueError(
+                f"initial: the load lies {self.initial_length:.4g} m from the vehicle, "
+                f"further than cable.rest_length = {self.cable.rest_length:.4g} m"
+            )
+        return self
+
+    @property
+    def hover_thrust(self) -> float:
+        """Total thrust that carries vehicle and load, N (eq. 19)."""
+        return (self.airframe.mass + self.load.mass) * self.gravity
+
+    @property
+    def hover_length(self) -> float:
+        """Cable length at the hover equilibrium, m (eq. 17, corrected: l_0 + m_p g / k_a)."""
+        return self.cable.rest_length + self.load.mass * self.gravity / self.cable.stiffness
+
+    @property
+    def initial_vehicle_position(self) -> Vector:
+        """Where the vehicle starts, m, world ENU: as given, in equilibrium above the load, or on its legs."""
+        if self.initial.start == "ground" and self.ground is not None:
+            x, y, _ = self.initial.vehicle_position or (0.0, 0.0, 0.0)
+            return (x, y, self.ground.height - min(leg[2] for leg in self.airframe.legs) - self.ground.sink)
+        if self.initial.vehicle_position is not None:
+            return self.initial.vehicle_position
+        x, y, z = self.initial.load_position
+        return (x, y, z + self.hover_length)
+
+    @property
+    def initial_load_position(self) -> Vector:
+        """Where the load starts, m, world ENU: as given, or lying on the ground there."""
+        x, y, z = self.initial.load_position
+        if self.initial.start == "ground" and self.ground is not None:
+            z = self.ground.height + self.load.radius - self.ground.sink
+        return (x, y, z)
+
+    @property
+    def initial_length(self) -> float:
+        """Distance from vehicle to load at the start, m."""
+        return math.dist(self.initial_vehicle_position, self.initial_load_position)
+
+
+def hover_rotor_speed(vehicle: Vehicle) -> float:
+    """Rotor speed of hover for a vehicle with equal rotors, rad/s (eq. 24, corrected)."""
+    total = sum(rotor.thrust_coefficient for rotor in vehicle.rotors)
+    return math.sqrt(vehicle.hover_thrust / total)
+
+
+def hover_rotor_speeds(vehicle: Vehicle) -> tuple[float, ...]:
+    """Rotor speeds that carry vehicle and load without any moment, for any layout, rad/s."""
+    effect = rotor_effect(vehicle.rotors) * [rotor.thrust_coefficient for rotor in vehicle.rotors]
+    squared, *_ = np.linalg.lstsq(effect, np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]), rcond=None)
+    return tuple(np.sqrt(np.maximum(squared, 0.0)).tolist())
