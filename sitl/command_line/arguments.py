@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 from controller.design.names import DESIGNS
 from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from sitl.command_line.argument_types import host_and_port, link_address, number, ports, whole
+from sitl.command_line.export import add_export
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.vehicle.files import preset_names, vehicle_names
 
@@ -94,6 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     controller.add_argument("--out", metavar="DIR", type=Path, help="where to write the estimate's log")
 
+    add_export(commands)
     bench = commands.add_parser(
         "bench",
         help="measure speed, and print ratios against the bare round trip",

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sitl.command_line.arguments import build_parser
+from sitl.command_line.export import run_export
 from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 from sitl_bridge.process import Speaker, StopRequest
@@ -225,7 +226,14 @@ def _paper(arguments: argparse.Namespace) -> int:
     return paper(arguments.out, arguments.quick)
 
 
-COMMANDS = {"fly": _fly, "plant": _plant, "controller": _controller, "bench": _bench, "paper": _paper}
+COMMANDS = {
+    "fly": _fly,
+    "plant": _plant,
+    "controller": _controller,
+    "bench": _bench,
+    "paper": _paper,
+    "export": run_export,
+}
 
 
 def main(argv: Sequence[str] | None = None) -> int:

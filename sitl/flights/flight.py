@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.feedback.truth import estimates
+from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Pair, ProgressLine, watch
 from sitl.flights.report import OF_THE_PLANT, clear, write_report
 from sitl.flights.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
@@ -169,4 +170,6 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     }
     path = path_from(start)
     estimating = vehicle if estimates(feedback, vehicle) else None
-    return write_report(options.out, facts, path, estimating), options.out
+    summary = write_report(options.out, facts, path, estimating)
+    keep_recording(options.out, vehicle, path)
+    return summary, options.out

@@ -12,16 +12,29 @@ from numpy.typing import NDArray
 
 from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.law.reference import Path as ReferencePath
+from sitl.export.mcap import FILE_NAME as MCAP_NAME
+from sitl.flights.html_report import FILE_NAME as HTML_NAME
 from sitl.flights.metrics import SETTLED_WINDOW, Metrics, flight_metrics, reference_positions
 from sitl.json_values import plain
+from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.account import Account
 from sitl_bridge.plant.log.state_log import FILE_NAME
 from sitl_bridge.vehicle.description import Vehicle
 
-SUMMARY_NAME = "summary.json"
 PICTURE_NAME = "flight.png"
-FILES = (SUMMARY_NAME, FILE_NAME, TLOG_NAME, PICTURE_NAME, ESTIMATE_NAME, COVARIANCE_NAME)
+FILES = (
+    SUMMARY_NAME,
+    FILE_NAME,
+    TLOG_NAME,
+    PICTURE_NAME,
+    ESTIMATE_NAME,
+    COVARIANCE_NAME,
+    VEHICLE_NAME,
+    REFERENCE_NAME,
+    MCAP_NAME,
+    HTML_NAME,
+)
 """Names of everything that a flight leaves in its folder."""
 OF_THE_PLANT = tuple(
     key for key in Account.__annotations__ if key not in ("completed", "failure", "stopped_by")

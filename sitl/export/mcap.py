@@ -1,0 +1,197 @@
+"""MCAP for Foxglove and PlotJuggler: Foxglove's schemas for what is drawn, JSON for what is plotted.
+
+Frames: `world` (ENU), `vehicle` (FLU) and `load`. Rates: see RATE_HZ; the state log keeps every tick.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sitl.recording.recording import Array, Recording
+from sitl.recording.sensors import SensorLog, read_sensors
+from sitl_bridge.frames import LocalOrigin
+
+FILE_NAME = "flight.mcap"
+RATE_HZ = 50.0
+"""Most samples a second of a channel."""
+SLOW_HZ = 5.0
+"""Of a map's positions and of the scene."""
+NANOSECONDS = 1_000_000_000
+
+
+def write_mcap(recording: Recording, file: Path) -> None:
+    """Write the flight beside its other logs; an older file is replaced."""
+    with _writer(recording, file) as writer:
+        for row in _rows(recording.times, RATE_HZ):
+            writer.tick(row)
+        for row in _rows(recording.times, SLOW_HZ):
+            writer.slow(row)
+        if recording.estimates is not None:
+            writer.estimates(recording.estimates)
+        if recording.tlog is not None:
+            writer.sensors(read_sensors(recording.tlog))
+        writer.outcome()
+
+
+def _rows(times: Array, rate_hz: float) -> list[int]:
+    """Indices of rows, at most so many a second, the first and the last among them."""
+    if len(times) < 2:
+        return list(range(len(times)))
+    step = max(1, round(1.0 / (rate_hz * float(times[1] - times[0]))))
+    return [*range(0, len(times) - 1, step), len(times) - 1]
+
+
+@contextmanager
+def _writer(recording: Recording, file: Path) -> Iterator[_FlightWriter]:
+    import foxglove
+
+    context = foxglove.Context()
+    sink = foxglove.open_mcap(file, allow_overwrite=True, context=context)
+    try:
+        yield _FlightWriter(recording, context)
+    finally:
+        sink.close()
+
+
+_NUMBER = {"type": ["number", "null"]}
+BODIES = ("vehicle", "load")
+REFERENCE = ("x_m", "y_m", "z_m", "error_m")
+
+
+class _FlightWriter:
+    """The channels of one file."""
+
+    def __init__(self, recording: Recording, context: Any) -> None:
+        from foxglove import channels, messages
+
+        from sitl.export import scene
+
+        self._m, self._scene, self._context = messages, scene, context
+        self._recording = recording
+        self._epoch = round((recording.summary.get("first_command_unix_s") or 0.0) * NANOSECONDS)
+        self._transforms = channels.FrameTransformsChannel("/tf", context=context)
+        self._bodies = channels.SceneUpdateChannel("/scene", context=context)
+        self._cable = channels.SceneUpdateChannel("/scene/cable", context=context)
+        self._log = channels.LogChannel("/log", context=context)
+        self._poses = {b: channels.PoseInFrameChannel(f"/{b}/pose", context=context) for b in BODIES}
+        self._fixes = {b: channels.LocationFixChannel(f"/{b}/location", context=context) for b in BODIES}
+        self._state_names = [name for name in recording.states if name != "time_s"]
+        self._rotor_names = [f"rotor_{i + 1}" for i in range(len(recording.vehicle.rotors))]
+        self._states = self._channel("/state", self._state_names)
+        self._reference = self._channel("/reference", REFERENCE)
+        self._controls = self._channel("/controls", self._rotor_names)
+        home = recording.vehicle.home
+        self._origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
+        self._positions = {body: recording.vectors(f"{body}_{{}}_m") for body in BODIES}
+        self._attitude = recording.vectors("attitude_q{}", "wxyz")
+        self._control_rows = recording.controls()
+        errors = np.linalg.norm(self._positions["load"] - recording.reference, axis=1)
+        self._reference_rows = np.column_stack((recording.reference, errors))
+        weight = recording.vehicle.load.mass * recording.vehicle.gravity
+        self._load_shares = recording.states["cable_tension_N"] / weight
+
+    def _channel(self, topic: str, names: Sequence[str]) -> Any:
+        """A channel of numbers with these names."""
+        import foxglove
+
+        schema = {"type": "object", "title": topic[1:], "properties": dict.fromkeys(names, _NUMBER)}
+        return foxglove.Channel(topic, schema=schema, context=self._context)
+
+    def tick(self, row: int) -> None:
+        """What moves: frames, poses, cable, and the rows of numbers."""
+        log_time, stamp = self._time(float(self._recording.times[row]))
+        self._log_poses(row, log_time, stamp)
+        ends = [tuple(self._positions[body][row].tolist()) for body in BODIES]
+        entity = self._scene.cable_entity(stamp, ends, float(self._load_shares[row]))
+        self._cable.log(self._m.SceneUpdate(entities=[entity]), log_time=log_time)
+        states = self._recording.states
+        self._states.log({name: _finite(states[name][row]) for name in self._state_names}, log_time=log_time)
+        self._reference.log(_numbers(REFERENCE, self._reference_rows[row]), log_time=log_time)
+        self._controls.log(_numbers(self._rotor_names, self._control_rows[row]), log_time=log_time)
+
+    def _log_poses(self, row: int, log_time: int, stamp: Any) -> None:
+        m = self._m
+        w, x, y, z = self._attitude[row].tolist()
+        turns = {"vehicle": m.Quaternion(x=x, y=y, z=z, w=w), "load": m.Quaternion(x=0, y=0, z=0, w=1)}
+        transforms = []
+        for body, channel in self._poses.items():
+            at = m.Vector3(**dict(zip("xyz", self._positions[body][row].tolist(), strict=True)))
+            pose = m.Pose(position=at, orientation=turns[body])
+            channel.log(m.PoseInFrame(timestamp=stamp, frame_id="world", pose=pose), log_time=log_time)
+            transforms.append(
+                m.FrameTransform(
+                    timestamp=stamp,
+                    parent_frame_id="world",
+                    child_frame_id=body,
+                    translation=at,
+                    rotation=turns[body],
+                )
+            )
+        self._transforms.log(m.FrameTransforms(transforms=transforms), log_time=log_time)
+
+    def slow(self, row: int) -> None:
+        """Where vehicle and load are on a map, and the bodies as they are drawn."""
+        m = self._m
+        log_time, stamp = self._time(float(self._recording.times[row]))
+        for body, channel in self._fixes.items():
+            x, y, z = self._positions[body][row].tolist()
+            latitude, longitude, altitude = self._origin.geodetic((x, y, z))
+            fix = m.LocationFix(
+                timestamp=stamp, frame_id=body, latitude=latitude, longitude=longitude, altitude=altitude
+            )
+            channel.log(fix, log_time=log_time)
+        vehicle = self._recording.vehicle
+        bodies = [self._scene.vehicle_entity(stamp, vehicle), self._scene.load_entity(stamp, vehicle)]
+        self._bodies.log(m.SceneUpdate(entities=bodies), log_time=log_time)
+
+    def estimates(self, estimates: dict[str, Array]) -> None:
+        """The autopilot's estimate."""
+        names = [name for name in estimates if name != "time_s"]
+        channel = self._channel("/estimate", names)
+        for row in _rows(estimates["time_s"], RATE_HZ):
+            numbers = {name: _finite(estimates[name][row]) for name in names}
+            channel.log(numbers, log_time=self._time(float(estimates["time_s"][row]))[0])
+
+    def sensors(self, log: SensorLog) -> None:
+        """HIL_SENSOR and HIL_GPS in wire units and frames."""
+        for topic, records, times in (
+            ("/sensors", log.sensors, log.sensor_times),
+            ("/gps", log.fixes, log.fix_times),
+        ):
+            names = [name for name in records.dtype.names or () if name != "time_usec"]
+            channel = self._channel(topic, names)
+            for row in _rows(times, RATE_HZ):
+                numbers = {name: _finite(records[name][row]) for name in names}
+                channel.log(numbers, log_time=self._time(float(times[row]))[0])
+
+    def outcome(self) -> None:
+        """How it ended, in words."""
+        summary, m = self._recording.summary, self._m
+        log_time, stamp = self._time(float(self._recording.times[-1]))
+        settled = bool(summary.get("settled"))
+        ended = "settled" if settled else "did not settle"
+        text = summary.get("outcome") or summary.get("failure") or ended
+        level = m.LogLevel.Info if settled else m.LogLevel.Warning
+        message = m.Log(timestamp=stamp, level=level, message=str(text), name="sitl fly")
+        self._log.log(message, log_time=log_time)
+
+    def _time(self, time_s: float) -> tuple[int, Any]:
+        """A scenario time as ns since the Unix epoch, and as a time stamp."""
+        log_time = self._epoch + round(time_s * NANOSECONDS)
+        return log_time, self._m.Timestamp(sec=log_time // NANOSECONDS, nsec=log_time % NANOSECONDS)
+
+
+def _numbers(names: Sequence[str], row: Array) -> dict[str, float | None]:
+    return dict(zip(names, map(_finite, row), strict=True))
+
+
+def _finite(value: Any) -> float | None:
+    """A number as JSON has it."""
+    number = float(value)
+    return number if math.isfinite(number) else None

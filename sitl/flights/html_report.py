@@ -1,0 +1,214 @@
+"""`flight.html`: a flight's report as one self-contained, interactive page (plotly), with no network needed.
+
+plotly's script is kept compressed in the page, and unpacked by the browser: a fifth of its size.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import itertools
+import json
+from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sitl.recording.recording import Array, Recording
+
+FILE_NAME = "flight.html"
+MOST_POINTS = 1500
+"""Of a line; between them the smallest and largest value of each stretch are kept."""
+_COLOURS = {"x": "#d62728", "y": "#2ca02c", "z": "#1f77b4"}
+_PANELS = (
+    "load and set-point [m]",
+    "load's distance from its set-point [m]",
+    "swing and tilt [°]",
+    "cable tension [N]",
+    "rotors, share of the largest speed",
+)
+
+
+def write_html(recording: Recording, file: Path) -> None:
+    """Write the report of a flight."""
+    figure = _figure(recording)
+    file.write_text(_page(recording.summary, figure), encoding="utf-8")
+
+
+def envelope(times: Array, values: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
+    """A line (n,) with fewer points that looks the same: the extremes of each stretch, in their order."""
+    count = len(times)
+    if count <= most:
+        return times, values
+    edges = np.linspace(0, count, most // 2 + 1).astype(int)
+    kept = {0, count - 1}
+    for start, stop in itertools.pairwise(edges.tolist()):
+        kept |= {start + int(np.argmin(values[start:stop])), start + int(np.argmax(values[start:stop]))}
+    rows = sorted(kept)
+    return times[rows], values[rows]
+
+
+def swing_deg(recording: Recording) -> Array:
+    """(n,): angle of the line from vehicle to load against the vertical, degrees."""
+    down = recording.vectors("vehicle_{}_m") - recording.vectors("load_{}_m")
+    return np.degrees(np.arctan2(np.hypot(down[:, 0], down[:, 1]), down[:, 2]))
+
+
+def tilt_deg(recording: Recording) -> Array:
+    """(n,): angle of the vehicle's z axis against the vertical, degrees."""
+    x, y = recording.states["attitude_qx"], recording.states["attitude_qy"]
+    return np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
+
+
+def slack_spans(times: Array, tension: Array) -> list[tuple[float, float]]:
+    """Stretches of time in which the cable carries nothing."""
+    slack = np.concatenate(([0], (tension <= 0.0).astype(int), [0]))
+    starts, stops = np.flatnonzero(np.diff(slack) == 1), np.flatnonzero(np.diff(slack) == -1)
+    return [(float(times[a]), float(times[b - 1])) for a, b in zip(starts, stops, strict=True)]
+
+
+def _figure(recording: Recording) -> dict[str, Any]:
+    """The figure as plotly's script takes it: traces and layout."""
+    times, states = recording.times, recording.states
+    load = recording.vectors("load_{}_m")
+    traces: list[dict[str, Any]] = []
+
+    def line(panel: int, name: str, values: Array, **style: Any) -> None:
+        x, y = envelope(times, values)
+        axis = "" if panel == 1 else str(panel)
+        rounded = ([float(f"{v:.6g}") for v in column] for column in (x.tolist(), y.tolist()))
+        trace = dict(zip("xy", rounded, strict=True)) | {"name": name, "type": "scatter", "mode": "lines"}
+        traces.append({**trace, "xaxis": "x", "yaxis": f"y{axis}", "legendgroup": str(panel), **style})
+
+    for index, letter in enumerate("xyz"):
+        colour = _COLOURS[letter]
+        line(1, f"{letter} of the load", load[:, index], line={"color": colour})
+        dashed = {"color": colour, "dash": "dash", "width": 1}
+        line(1, f"{letter} of the set-point", recording.reference[:, index], line=dashed)
+        _add_band(traces, recording, letter, colour)
+    line(2, "distance", np.linalg.norm(load - recording.reference, axis=1))
+    line(3, "swing of the load", swing_deg(recording))
+    line(3, "tilt of the vehicle", tilt_deg(recording))
+    line(4, "tension", states["cable_tension_N"])
+    controls = recording.controls()
+    for rotor in range(controls.shape[1]):
+        line(5, f"rotor {rotor + 1}", controls[:, rotor], line={"width": 1})
+    return {"data": traces, "layout": _layout(recording)}
+
+
+def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, colour: str) -> None:
+    """The estimate of one coordinate of the load, where there is one."""
+    estimates = recording.estimates
+    if estimates is None:
+        return
+    x, y = envelope(estimates["time_s"], estimates[f"load_{letter}_m"])
+    traces.append(
+        {
+            "x": x.tolist(),
+            "y": y.tolist(),
+            "name": f"{letter}, estimated",
+            "type": "scatter",
+            "mode": "lines",
+            "line": {"color": colour, "width": 1, "dash": "dot"},
+            "yaxis": "y",
+            "legendgroup": "1",
+        }
+    )
+
+
+def _layout(recording: Recording) -> dict[str, Any]:
+    """Panels below each other on one time axis; slack stretches shaded."""
+    gap = 0.04
+    height = (1.0 - gap * (len(_PANELS) - 1)) / len(_PANELS)
+    layout: dict[str, Any] = {
+        "height": 1150,
+        "margin": {"l": 70, "r": 20, "t": 20, "b": 50},
+        "hovermode": "x unified",
+        "template": "plotly_white",
+        "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(_PANELS)}"},
+        "shapes": _shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
+    }
+    for index, title in enumerate(_PANELS):
+        top = 1.0 - index * (height + gap)
+        axis = {"domain": [top - height, top], "title": {"text": title}}
+        layout["yaxis" if index == 0 else f"yaxis{index + 1}"] = axis
+    return layout
+
+
+def _shading(spans: Iterable[tuple[float, float]]) -> list[dict[str, Any]]:
+    return [
+        {
+            "type": "rect",
+            "xref": "x",
+            "yref": "paper",
+            "x0": start,
+            "x1": stop,
+            "y0": 0,
+            "y1": 1,
+            "fillcolor": "rgba(120,120,120,0.2)",
+            "line": {"width": 0},
+        }
+        for start, stop in list(spans)[:200]
+    ]
+
+
+def _facts(summary: dict[str, Any]) -> str:
+    """The summary as a table: plain values only."""
+    rows = []
+    for key, value in summary.items():
+        if value is None or isinstance(value, (dict, list)):
+            continue
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        rows.append(f"<tr><th>{html.escape(key)}</th><td>{html.escape(text)}</td></tr>")
+    return "\n".join(rows)
+
+
+def _page(summary: dict[str, Any], figure: dict[str, Any]) -> str:
+    script = (resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes()
+    packed = base64.b64encode(gzip.compress(script, 9, mtime=0)).decode()
+    title = html.escape(f"{summary.get('scenario')}: {summary.get('vehicle')}")
+    data = json.dumps(figure, allow_nan=False).replace("</", "<\\/")
+    return _TEMPLATE.format(title=title, facts=_facts(summary), packed=packed, data=data)
+
+
+_TEMPLATE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 1150px; padding: 0 1em; }}
+table {{ border-collapse: collapse; font-size: 13px; columns: 2; }}
+th {{ text-align: left; font-weight: 500; padding-right: 1.5em; }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+<p>Grey stretches: the cable is slack.
+Click a name to hide its line, drag to zoom, double-click to go back.</p>
+<div id="figure"></div>
+<details><summary>All figures of the flight</summary><table>
+{facts}
+</table></details>
+<script type="application/json" id="data">{data}</script>
+<script type="application/octet-stream" id="plotly">{packed}</script>
+<script>
+(async () => {{
+  const text = document.getElementById("plotly").textContent;
+  const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const script = document.createElement("script");
+  script.textContent = await new Response(stream).text();
+  document.head.appendChild(script);
+  const figure = JSON.parse(document.getElementById("data").textContent);
+  await Plotly.newPlot("figure", figure.data, figure.layout, {{responsive: true}});
+  document.body.dataset.ready = "yes";
+}})();
+</script>
+</body>
+</html>
+"""

@@ -1,0 +1,54 @@
+"""The interactive report: what is drawn is what was flown."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sitl.flights.html_report import envelope, slack_spans, swing_deg, tilt_deg, write_html
+from sitl.recording.recording import read_recording
+from tests.sitl.export.flights import leave_flight
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=400), st.integers(4, 60))
+def test_a_thinned_line_keeps_its_extremes_and_its_ends(values: list[float], most: int) -> None:
+    column = np.array(values)
+    times, kept = envelope(np.arange(len(values), dtype=float), column, most)
+    assert len(kept) <= max(most + 2, 2)
+    assert kept.min() == column.min()
+    assert kept.max() == column.max()
+    assert (times[0], times[-1]) == (0.0, len(values) - 1.0)
+    assert np.all(np.diff(times) > 0)
+
+
+def test_swing_and_tilt_of_known_positions(tmp_path: Path) -> None:
+    leave_flight(tmp_path, rows=2)
+    recording = read_recording(tmp_path)
+    # The load is 1 m north of the vehicle, 1.5 m below it; roll 0, pitch 0.3 rad at the start.
+    assert swing_deg(recording)[0] == pytest.approx(np.degrees(np.arctan2(1.0, 1.5)))
+    assert tilt_deg(recording)[0] == pytest.approx(np.degrees(0.3))
+
+
+def test_slack_stretches_are_found() -> None:
+    tension = np.array([1.0, 0.0, 0.0, 2.0, 0.0])
+    assert slack_spans(np.arange(5.0), tension) == [(1.0, 2.0), (4.0, 4.0)]
+
+
+def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -> None:
+    leave_flight(tmp_path)
+    recording = read_recording(tmp_path)
+    page = tmp_path / "flight.html"
+    write_html(recording, page)
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r'(src|href)="', text)
+    data = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)
+    assert data is not None
+    traces = {trace["name"]: trace for trace in json.loads(data[1])["data"]}
+    assert max(traces["x of the load"]["y"]) == pytest.approx(recording.states["load_x_m"].max(), rel=1e-5)
+    assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
