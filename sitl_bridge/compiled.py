@@ -4,10 +4,10 @@ Numba compiles, but importing and initialising it takes over a second, more than
 start. So it works once, in a process of its own, and its machine code goes into a cache; a flight only loads
 that file (milliseconds) through llvmlite, and calls it through ctypes (less than a microsecond).
 
-A cache entry is one file that appears whole or not at all, with the digests of everything it was made from;
-its name holds the machine and the versions it was made for, so that environments which share a directory do
-not overwrite each other's. Code is loaded only from next to the sources (whoever writes there can change
-them too) and from directories that belong to the user and nobody else can write.
+The cache belongs to the user; all checkouts and environments share it. The name of an entry is a digest of
+what is compiled (bytecode and constants, see `_key`), of the versions and of the CPU. Comments, docstrings
+and formatting do not change it, nor does the folder of the sources. An entry appears whole or not at all.
+Code is loaded only from directories that belong to the user and that nobody else can write.
 
 Three decorators mark what is compiled:
 
@@ -35,16 +35,17 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import metadata
 from pathlib import Path
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple, TypeVar
 
-import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
 _COMPILING = "SITL_BRIDGE_COMPILING"  # set in the environment of the process that compiles
-_ROOT = Path(__file__).resolve().parent.parent
+_MARK = "__compiled_as__"  # attribute of a function that is compiled
 _LIBM = {
     name + suffix
     for name in (
@@ -56,8 +57,6 @@ _LIBM = {
 }
 _MEMORY = {"memcpy", "memset", "memmove"}
 INTERRUPTED = {-signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP}
-# Other packages whose contents end up in machine code: the compiler's, and constants of the dialect.
-_FOREIGN = ("numba._version", "pymavlink.dialects.v20.common")
 
 
 class Buffer(NamedTuple):
@@ -75,6 +74,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Mark a function that compiled code calls; plain Python except while compiling."""
+    function.__dict__[_MARK] = "kernel"
     if os.environ.get(_COMPILING):
         from numba import njit
 
@@ -85,6 +85,7 @@ def kernel(function: Function) -> Function:
 
 def vector_kernel(function: Function) -> Function:
     """Mark a kernel whose sums may be taken in any order, so that one instruction works on several terms."""
+    function.__dict__[_MARK] = "vector kernel"
     if os.environ.get(_COMPILING):
         from numba import njit
 
@@ -237,72 +238,162 @@ def _symbol(module: str, name: str) -> str:
 
 def _machine() -> str:
     features = llvm.get_host_cpu_features().flatten()
-    versions = f"{sys.implementation.cache_tag} numpy {np.__version__} llvmlite {llvmlite.__version__}"
-    return f"{versions} {llvm.get_process_triple()} {llvm.get_host_cpu_name()} {features}"
+    versions = " ".join(f"{name} {metadata.version(name)}" for name in ("numpy", "numba", "llvmlite"))
+    target = f"{llvm.get_process_triple()} {llvm.get_host_cpu_name()} {features}"
+    return f"{sys.implementation.cache_tag} {versions} {target}"
 
 
 def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _file_name(module: str) -> str:
-    """Of the cache entry of a module, for this machine and this place of the sources."""
-    return f"{module}.{_digest(f'{_ROOT} {_machine()}'.encode())[:16]}.native"
+def _entries(module: str) -> dict[str, EntryPoint]:
+    """The entry points that a module defines, by name."""
+    values = vars(importlib.import_module(module)).values()
+    return {v.name: v for v in values if isinstance(v, EntryPoint) and v.python.__module__ == module}
+
+
+def _key(module: str) -> str:
+    """Digest of all that decides the machine code of a module: functions, constants, versions, CPU."""
+    description = _Description()
+    description.add(_machine())
+    with suppress(LookupError):  # this module itself: how code is made
+        description.add(sys.modules[__name__].__spec__.loader.get_code(__name__))  # type: ignore[union-attr]
+    for name, entry in sorted(_entries(module).items()):
+        description.add((name, entry.python, entry.arguments, entry.returns))
+    return description.digest()
+
+
+class _Description:
+    """Digest of Python objects as compiled code depends on them.
+
+    A function counts by its bytecode and by the constants and kernels that it names; not by its comments,
+    docstring, line numbers or file.
+    """
+
+    def __init__(self) -> None:
+        self._hash = hashlib.sha256()
+        self._seen: dict[int, int] = {}
+
+    def digest(self) -> str:
+        return self._hash.hexdigest()
+
+    def add(self, value: Any) -> None:
+        value = getattr(value, "py_func", value)  # a kernel in the process that compiles
+        if isinstance(value, FunctionType) and _MARK in value.__dict__:
+            self._add_kernel(value)
+        elif isinstance(value, CodeType):
+            self._add_code(value)
+        elif isinstance(value, tuple | list):
+            self._text(f"{type(value).__qualname__} of {len(value)}")
+            for item in value:
+                self.add(item)
+        elif isinstance(value, np.ndarray | np.generic):
+            self._text(f"{value.dtype!r} {value.shape}")
+            self._hash.update(value.tobytes())
+        elif isinstance(value, frozenset):
+            self._text(f"frozenset {sorted(map(repr, value))}")
+        elif isinstance(value, bool | int | float | complex | str | bytes | np.dtype | None):
+            self._text(f"{type(value).__qualname__} {value!r}")
+        elif isinstance(value, type | ModuleType | FunctionType | BuiltinFunctionType):
+            self._text(f"{getattr(value, '__module__', '')} {value.__name__}")
+        else:
+            self._text(type(value).__qualname__)  # nothing that the compiler can take in
+
+    def _text(self, text: str) -> None:
+        self._hash.update(text.encode() + b"\0")
+
+    def _add_kernel(self, function: FunctionType) -> None:
+        if id(function) in self._seen:
+            self._text(f"kernel {self._seen[id(function)]}")
+            return
+        self._seen[id(function)] = len(self._seen)
+        self._text(function.__dict__[_MARK])
+        self.add(function.__defaults__)
+        self._add_code(function.__code__)
+        for cell in function.__closure__ or ():
+            self.add(cell.cell_contents)
+        for name in _names(function.__code__):
+            if name in function.__globals__:
+                value = function.__globals__[name]
+                self.add(value)
+                if isinstance(value, ModuleType):
+                    self._add_attributes(value, _names(function.__code__))
+
+    def _add_attributes(self, module: ModuleType, names: list[str]) -> None:
+        """What code that names a module may take from it; another package's is told by its version."""
+        for name in names:
+            if name in vars(module):
+                self.add(vars(module)[name])
+
+    def _add_code(self, code: CodeType) -> None:
+        self._text(
+            f"{code.co_argcount} {code.co_flags} {code.co_names} {code.co_varnames} {code.co_freevars}"
+        )
+        self._hash.update(code.co_code)
+        constants = list(code.co_consts)
+        if constants and isinstance(constants[0], str):
+            constants[0] = None  # the docstring
+        self.add(constants)
+
+
+def _names(code: CodeType) -> list[str]:
+    """Names that a function and the functions within it look up: globals and attributes."""
+    within = [name for part in code.co_consts if isinstance(part, CodeType) for name in _names(part)]
+    return sorted({*code.co_names, *within})
+
+
+def _file_name(module: str, key: str) -> str:
+    return f"{module}.{key[:24]}.native"
 
 
 def _cache_directories() -> list[Path]:
-    """Where cache entries may be, the preferred first; all but the first have to be private."""
+    """Where cache entries may be, the preferred first; they have to be private."""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     of_user = Path(tempfile.gettempdir()) / f"sitl-bridge-{os.getuid()}"
-    directories = [_ROOT / "sitl_bridge" / "__pycache__", Path(home) / "sitl-bridge", of_user]
-    return [directory for directory in directories if directory.is_absolute()]
+    return [directory for directory in (Path(home) / "sitl-bridge", of_user) if directory.is_absolute()]
 
 
 def _trusted(directory: Path) -> bool:
-    """Whether nobody but this user, or who can change the sources anyhow, can have put code there."""
-    if directory.parent == Path(__file__).resolve().parent:
-        return True
+    """Whether nobody but this user can have put code there."""
     status = directory.lstat()
     shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
     return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not shared
 
 
-def _packed(code: bytes, sources: dict[str, str]) -> bytes:
+def _packed(code: bytes, key: str) -> bytes:
     """A cache entry: one line of JSON, then the object file."""
-    header = {"machine": _machine(), "sha256": _digest(code), "sources": sources}
-    return json.dumps(header).encode() + b"\n" + code
+    return json.dumps({"key": key, "sha256": _digest(code)}).encode() + b"\n" + code
 
 
-def _valid_code(entry: bytes) -> bytes | None:
-    """The object file of a cache entry, if it is whole and made on such a machine from these very sources."""
+def _valid_code(entry: bytes, key: str) -> bytes | None:
+    """The object file of a cache entry, if it is whole and has this key."""
     line, _, code = entry.partition(b"\n")
     try:
         header = json.loads(line)
-        fresh = (
-            header["machine"] == _machine()
-            and header["sha256"] == _digest(code)
-            and all(_digest(Path(file).read_bytes()) == seen for file, seen in header["sources"].items())
-        )
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        fresh = header["key"] == key and header["sha256"] == _digest(code)
+    except (ValueError, LookupError, TypeError):
         return None
     return code if fresh else None
 
 
 def _cached_object(module: str) -> bytes:
     """Machine code of a module's entry points: from the cache, or compiled now."""
+    key = _key(module)
+    name = _file_name(module, key)
     for directory in _cache_directories():
         try:
-            entry = (directory / _file_name(module)).read_bytes() if _trusted(directory) else b""
+            entry = (directory / name).read_bytes() if _trusted(directory) else b""
         except OSError:
             continue
-        if code := _valid_code(entry):
+        if code := _valid_code(entry, key):
             return code
     print(f"compiling {module}, once", file=sys.stderr, flush=True)
     entry = _compile(module)
-    code = _valid_code(entry)
+    code = _valid_code(entry, key)
     if code is None:
         raise RuntimeError(f"compiling {module} failed: its sources changed meanwhile")
-    if not any(_stored(directory, _file_name(module), entry) for directory in _cache_directories()):
+    if not any(_stored(directory, name, entry) for directory in _cache_directories()):
         print(f"no place to keep the compiled {module}: each start compiles it", file=sys.stderr, flush=True)
     return code
 
@@ -360,24 +451,11 @@ def build(module: str) -> None:
         jit=True,
         codemodel="jitdefault",
     )
-    values = vars(importlib.import_module(module)).values()
-    entries = {v.name: v for v in values if isinstance(v, EntryPoint) and v.python.__module__ == module}
     whole = llvm.parse_assembly("")
-    for entry in entries.values():
+    for entry in _entries(module).values():
         whole.link_in(_self_contained(entry, machine))
     with open(output, "wb") as standard_output:
-        standard_output.write(_packed(bytes(machine.emit_object(whole)), _sources(module)))
-
-
-def _sources(module: str) -> dict[str, str]:
-    """Digests of the files that the machine code was made from."""
-    packages = {__name__.partition(".")[0], module.partition(".")[0]}
-    files = {
-        getattr(loaded, "__file__", None)
-        for name, loaded in list(sys.modules.items())
-        if name.partition(".")[0] in packages or name in _FOREIGN
-    }
-    return {file: _digest(Path(file).read_bytes()) for file in sorted(filter(None, files))}
+        standard_output.write(_packed(bytes(machine.emit_object(whole)), _key(module)))
 
 
 def _self_contained(entry: EntryPoint, machine: Any) -> Any:
