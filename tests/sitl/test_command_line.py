@@ -143,14 +143,14 @@ def test_an_interrupt_while_it_starts_is_one_line(command: str) -> None:
     script = (
         "import os, signal, sys\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "from sitl import start\n"
+        "from sitl import entry\n"
         "class Strikes:\n"
         "    def find_spec(self, name, *rest):\n"
         "        if name == 'sitl.command_line.commands':\n"
         "            os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Strikes())\n"
         f"sys.argv[1:] = {command.split()!r}\n"
-        "sys.exit(start.main())\n"
+        "sys.exit(entry.main())\n"
     )
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stderr) == (130, "sitl: interrupted\n")
