@@ -10,6 +10,7 @@ from controller.design.names import DESIGNS
 from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from sitl.command_line.argument_types import host_and_port, link_address, number, ports, whole
 from sitl.command_line.export import add_export
+from sitl.command_line.view import add_view
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.vehicle.files import preset_names, vehicle_names
 
@@ -56,7 +57,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="a scenario's name (see below) or .toml file (default: %(default)s)",
     )
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
-    for add in (_vehicle, _link, _clock, _loop, _control, _seed, _ground, _output):
+    for add in (_vehicle, _link, _clock, _loop, _control, _seed, _ground, _view, _output):
         add(fly)
     _duration(fly, "the scenario's, or until stopped")
     fly.add_argument(
@@ -72,9 +73,16 @@ def build_parser() -> argparse.ArgumentParser:
         help="simulate vehicle, cable and load",
         description="Simulate vehicle, cable and load, and speak PX4's simulator API on the HIL link.",
     )
-    for add in (_scenario, _vehicle, _link, _clock, _loop, _seed, _output, _supervised):
+    for add in (_scenario, _vehicle, _link, _clock, _loop, _seed, _view, _output, _supervised):
         add(plant)
     _duration(plant, "the scenario's, or until stopped")
+    plant.add_argument(
+        "--truth-to",
+        metavar="HOST:PORT",
+        type=host_and_port,
+        help="show the true state of vehicle and load to a viewer: HIL_STATE_QUATERNION and ODOMETRY "
+        "(PX4's viewers listen on 127.0.0.1:19410)",
+    )
     plant.add_argument(
         "--load-to",
         metavar="HOST:PORT",
@@ -96,6 +104,7 @@ def build_parser() -> argparse.ArgumentParser:
     controller.add_argument("--out", metavar="DIR", type=Path, help="where to write the estimate's log")
 
     add_export(commands)
+    add_view(commands)
     bench = commands.add_parser(
         "bench",
         help="measure speed, and print ratios against the bare round trip",
@@ -276,6 +285,12 @@ def _duration(parser: argparse.ArgumentParser, default: str) -> None:
         metavar="S",
         type=number(0.01, 1e6, "seconds"),
         help=f"how long to fly (default: {default})",
+    )
+
+
+def _view(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--view", action="store_true", help="show it in the browser while it flies; needs the extra [view]"
     )
 
 

@@ -6,11 +6,13 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sitl.command_line.arguments import build_parser
 from sitl.command_line.export import run_export
+from sitl.command_line.view import run_view
 from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 from sitl_bridge.process import Speaker, StopRequest
@@ -95,6 +97,18 @@ def _faults_of(scenario: Scenario | None, vehicle: Vehicle) -> Faults:
     return Faults() if scenario is None else checked(scenario.faults, vehicle)
 
 
+def _audience(
+    arguments: argparse.Namespace, vehicle: Vehicle, more: Sequence[Address] = ()
+) -> AbstractContextManager[tuple[str, int] | None]:
+    """The viewer that --view asks for, while a flight lasts: the host and port where it hears the truth."""
+    if not arguments.view:
+        return nullcontext()
+    from sitl.view.launch import check_installed, viewer
+
+    check_installed()
+    return viewer(vehicle, more)
+
+
 def _plant(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments, of_plant=True)
     hil = _hil_address(arguments, "udpout")
@@ -118,8 +132,10 @@ def _plant(arguments: argparse.Namespace) -> int:
         out=arguments.out,
         faults=_faults_of(scenario, vehicle),
         load_to=arguments.load_to,
+        truth_to=arguments.truth_to,
     )
-    outcome = run(options, speaker, stop)
+    with _audience(arguments, vehicle) as viewer:
+        outcome = run(replace(options, truth_to=viewer or options.truth_to), speaker, stop)
     if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
     return FAILED if outcome["failure"] else 0
@@ -158,10 +174,12 @@ def _controller(arguments: argparse.Namespace) -> int:
 
 
 def _fly(arguments: argparse.Namespace) -> int:
+    from controller.ground.link.ports import STATION_LOCAL
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
     from sitl.flights.report import table, written
     from sitl.flights.scenario import GroundControl, load_scenario
+    from sitl_bridge.mavlink.links import Address
 
     timing = _timing(arguments, Timing("realtime", None))
     scenario = load_scenario(arguments.scenario)
@@ -191,11 +209,15 @@ def _fly(arguments: argparse.Namespace) -> int:
         if arguments.json:
             raise DescriptionError("--json", ["under ground control there is no summary to print"])
         options = replace(options, ground=ground_arguments(_ground_options(arguments)))
-        failure = hold(options, stop)
+        stations = STATION_LOCAL + arguments.instance if arguments.gcs is None else arguments.gcs.local
+        more = [Address("udpout", "127.0.0.1", stations)]
+        with _audience(arguments, options.checked_vehicle(), more) as viewer:
+            failure = hold(replace(options, truth_to=viewer), stop)
         if failure:
             print(f"fly: {failure}", file=sys.stderr, flush=True)
         return FAILED if failure else 0
-    summary, out = fly(options, stop)
+    with _audience(arguments, options.checked_vehicle()) as viewer:
+        summary, out = fly(replace(options, truth_to=viewer), stop)
     if arguments.json:
         print(json.dumps(summary, indent=2))
     else:
@@ -233,6 +255,7 @@ COMMANDS = {
     "bench": _bench,
     "paper": _paper,
     "export": run_export,
+    "view": run_view,
 }
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from foxglove import messages as m
 
+from sitl.export.shapes import disc_diameter, load_radius
 from sitl_bridge.vehicle.description import Vehicle
 
 Point = tuple[float, float, float]
@@ -15,15 +15,6 @@ _ARM = m.Color(r=0.2, g=0.2, b=0.25, a=1.0)
 _DISC = m.Color(r=0.2, g=0.5, b=0.9, a=0.5)
 _LOAD = m.Color(r=0.9, g=0.5, b=0.1, a=1.0)
 _SLACK = m.Color(r=0.6, g=0.6, b=0.6, a=1.0)
-SMALLEST_LOAD = 0.05
-"""m, radius with which a load without one is drawn."""
-
-
-def disc_diameter(vehicle: Vehicle, rotor: int) -> float:
-    """Of a rotor as it is drawn, m: as described, or such that neighbours do not touch."""
-    described = vehicle.rotors[rotor].diameter
-    x, y, _ = vehicle.rotors[rotor].position
-    return described or 0.9 * math.hypot(x, y)
 
 
 def _line(points: list[Point], thickness: float, color: Any) -> Any:
@@ -63,7 +54,7 @@ def vehicle_entity(stamp: Any, vehicle: Vehicle) -> Any:
 
 def load_entity(stamp: Any, vehicle: Vehicle) -> Any:
     """A ball in the load's frame."""
-    size = 2.0 * max(vehicle.load.radius, SMALLEST_LOAD)
+    size = 2.0 * load_radius(vehicle)
     pose = m.Pose(position=m.Vector3(x=0, y=0, z=0), orientation=_UPRIGHT)
     ball = m.SpherePrimitive(pose=pose, size=m.Vector3(x=size, y=size, z=size), color=_LOAD)
     return m.SceneEntity(timestamp=stamp, frame_id="load", id="load", frame_locked=True, spheres=[ball])

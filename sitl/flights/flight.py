@@ -50,6 +50,8 @@ class FlightOptions:
     instance: int
     out: Path | None
     """None: a new folder under runs/; under ground control, no logs."""
+    truth_to: tuple[str, int] | None = None
+    """Host and port of a viewer that is shown the truth."""
     ground: Sequence[str] = ()
     """Arguments of the controller for its ground-control links."""
 
@@ -71,6 +73,8 @@ class FlightOptions:
         if self.duration_s is not None:
             plant += ["--duration", repr(self.duration_s)]
         plant += ["--drop", repr(self.drop_percent)]
+        if self.truth_to is not None:
+            plant += ["--truth-to", "{}:{}".format(*self.truth_to)]
         if self.out is not None:
             plant += ["--out", str(self.out)]
         controller = [*common, "--hil", str(self.other_end), "--design", self.design]

@@ -110,7 +110,7 @@ def read_recording(folder: Path) -> Recording:
     return Recording(
         folder,
         _summary(folder),
-        _vehicle(folder),
+        read_vehicle(folder / VEHICLE_NAME),
         states,
         np.stack(set_points, axis=1),
         read_columns(estimates) if estimates.exists() else None,
@@ -128,8 +128,8 @@ def _summary(folder: Path) -> dict[str, Any]:
     return summary
 
 
-def _vehicle(folder: Path) -> Vehicle:
-    file = folder / VEHICLE_NAME
+def read_vehicle(file: Path) -> Vehicle:
+    """The description that `write_vehicle` kept; raises RecordingError."""
     try:
         return Vehicle.model_validate_json(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -23,6 +23,7 @@ from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
 from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.simulation import NO_FAULTS, Diverged, Simulation
 from sitl_bridge.plant.wire.load_to import LoadTo
+from sitl_bridge.plant.wire.truth_to import TruthTo
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -48,6 +49,8 @@ class PlantOptions:
     faults: Faults = NO_FAULTS
     load_to: tuple[str, int] | None = None
     """Ground station that is shown the load directly."""
+    truth_to: tuple[str, int] | None = None
+    """Viewer that is shown the true state of vehicle and load."""
 
 
 class Progress:
@@ -121,20 +124,22 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         f"{options.vehicle.name}, {options.clock} at {options.rate_hz:g} Hz, "
         f"waiting for an autopilot on {options.hil} (system {options.instance + 1})"
     )
-    station: Station | None = None
+    audience: list[Listener] = []
     failure = None
     try:
         if options.load_to is not None:
-            station = Station(options.load_to, LoadTo(options.instance, simulation.origin))
-        _loop(clock, link, tlog, progress, station, stop)
+            audience.append(Listener(options.load_to, LoadTo(options.instance, simulation.origin)))
+        if options.truth_to is not None:
+            audience.append(Listener(options.truth_to, TruthTo(options.instance, simulation.origin)))
+        _loop(clock, link, tlog, progress, audience, stop)
     except Diverged as error:
         failure = str(error)
         speaker.say(f"{failure}: it ends here; what the description asks for cannot be simulated")
     finally:
         factor = progress.factor(simulation)  # now: the logs take their time to close
         link.close()
-        if station is not None:
-            station.close()
+        for listener in audience:
+            listener.close()
         if tlog is not None:
             tlog.close()
         if log is not None:
@@ -146,16 +151,16 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
     return outcome
 
 
-class Station:
-    """A ground station that is shown the load."""
+class Listener:
+    """A ground station or a viewer that is only told, at the pace of the wall clock."""
 
-    def __init__(self, address: tuple[str, int], load: LoadTo) -> None:
+    def __init__(self, address: tuple[str, int], source: LoadTo | TruthTo) -> None:
         self._link = open_link(Address("udpout", *address), lambda text: None)
-        self._load = load
+        self._source = source
 
     def show(self, now: float, simulation: Simulation) -> None:
         """Send what is due."""
-        datagram = self._load.to_send(now, simulation.time_usec, simulation.world.state)
+        datagram = self._source.to_send(now, simulation.time_usec, simulation.world)
         if datagram is not None:
             self._link.send(datagram)
 
@@ -169,7 +174,7 @@ def _loop(
     link: Link,
     tlog: TlogWriter | None,
     progress: Progress,
-    station: Station | None,
+    audience: list[Listener],
     stop: StopRequest,
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
@@ -190,8 +195,8 @@ def _loop(
                 tlog.write(received, epoch + now)
         if now >= progress.due:
             progress.report(now, simulation)
-        if station is not None:
-            station.show(now, simulation)
+        for listener in audience:
+            listener.show(now, simulation)
 
 
 def _outcome(

@@ -189,7 +189,7 @@ def test_load_to_shows_the_load_to_maps_of_both_kinds() -> None:
     state[16:19] = (1.0, 0.0, 0.5)
     counts = {"HEARTBEAT": 0, "GLOBAL_POSITION_INT": 0, "ADSB_VEHICLE": 0}
     for k in range(1000):  # ten seconds of wall time, simulated time standing still
-        datagram = load.to_send(100.0 + 0.01 * k, 4000, state)
+        datagram = load.to_send(100.0 + 0.01 * k, 4000, simulation.world)
         for frame in split(datagram or b"").frames:
             message = decode(frame)
             counts[message.get_type()] += 1

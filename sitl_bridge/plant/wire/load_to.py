@@ -6,7 +6,7 @@ from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.mavlink.traffic import load_traffic
-from sitl_bridge.plant.physics.state import Array
+from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.wire.slow_frames import (
     HEARTBEAT_INTERVAL,
     POSITION_INTERVAL,
@@ -29,12 +29,12 @@ class LoadTo:
         self._next = 0.0
         self._count = 0
 
-    def to_send(self, now: float, time_usec: int, x: Array) -> bytes | None:
+    def to_send(self, now: float, time_usec: int, world: World) -> bytes | None:
         """What is due: where the load is, and once a second that it is there."""
         if now < self._next:
             return None
         self._next = now + POSITION_INTERVAL
-        position = self._map.global_position(time_usec, x)
+        position = self._map.global_position(time_usec, world.state)
         out = self._load.pack(position)
         if self._count % HEARTBEAT_EVERY == 0:
             traffic = load_traffic(self._instance, position)

@@ -1,0 +1,103 @@
+"""The view in a real browser: it draws, what it draws moves, and its controls act."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, sync_playwright
+
+from tests.sitl.export.flights import leave_flight
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+PATIENCE_MS = 60_000
+PICTURES = os.environ.get("DOCS_PICTURES")
+"""Folder for screenshots that the documentation shows; see CONTRIBUTING.md."""
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Page]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=BROWSER,
+            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"],
+        )
+        page = browser.new_page(viewport={"width": 900, "height": 600})
+        page.set_default_timeout(PATIENCE_MS)
+        yield page
+        browser.close()
+
+
+@pytest.fixture
+def flight(tmp_path: Path) -> Path:
+    leave_flight(tmp_path)
+    return tmp_path
+
+
+def picture(page: Page) -> np.ndarray:  # type: ignore[type-arg]
+    """What the canvas shows, (height, width, 4)."""
+    from io import BytesIO
+
+    from matplotlib.image import imread
+
+    return np.asarray(imread(BytesIO(page.locator("canvas").first.screenshot()), format="png"))
+
+
+def until_moving(page: Page) -> bool:
+    """Whether the canvas changes from one look to another, before long."""
+    before = picture(page)
+    for _ in range(40):
+        page.wait_for_timeout(250)
+        if not np.array_equal(picture(page), before):
+            return True
+    return False
+
+
+def test_a_finished_flight_is_played_and_paused(flight: Path, page: Page) -> None:
+    command = [sys.executable, "-m", "sitl", "view", str(flight), "--port", "18200", "--until-eof"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as view:
+        assert view.stdout is not None
+        assert view.stdin is not None
+        try:
+            page.goto(json.loads(view.stdout.readline())["address"])
+            page.get_by_text("tension").first.wait_for()
+            assert until_moving(page)
+            seen = picture(page)
+            if PICTURES:
+                page.screenshot(path=Path(PICTURES) / "view.png")
+            assert len(np.unique(seen.reshape(-1, seen.shape[-1]), axis=0)) > 20  # not blank
+            page.get_by_role("checkbox", name="Play").click(force=True)
+            page.wait_for_timeout(1500)
+            still = page.get_by_role("textbox").first.input_value()
+            page.wait_for_timeout(1000)
+            assert page.get_by_role("textbox").first.input_value() == still
+        finally:
+            view.stdin.close()
+            assert view.wait(30) == 0
+
+
+def test_an_exported_page_needs_no_server(flight: Path, page: Page) -> None:
+    file = flight / "mine.html"
+    subprocess.run([sys.executable, "-m", "sitl", "view", str(flight), "--export", str(file)], check=True)
+    page.goto(file.as_uri())
+    page.locator("canvas").first.wait_for()
+    assert until_moving(page)
+
+
+def test_the_report_draws_its_panels(flight: Path, page: Page) -> None:
+    from sitl.flights.html_report import write_html
+    from sitl.recording.recording import read_recording
+
+    file = flight / "report.html"
+    write_html(read_recording(flight), file)
+    page.goto(file.as_uri())
+    page.locator("body[data-ready=yes]").wait_for()
+    assert page.locator("g.trace").count() > 0 or page.locator(".scatterlayer .trace").count() > 0

@@ -1,0 +1,71 @@
+"""`sitl view` without a browser: sources, replays, refusals."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sitl.recording.recording import RecordingError, read_recording
+from sitl.view.panel import aim, numbers
+from sitl.view.replay import views_of_recording, views_of_tlog
+from sitl.view.view import View
+from tests.sitl.export.flights import leave_flight
+
+
+def sitl_view(*arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "sitl", "view", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("nonsense",), "udpout|udpin|"),
+        (("nonsense",), "finished flight"),
+        (("udpin:127.0.0.1:20001", "--export", "x.html"), "--export"),
+        ((".", "udpin:127.0.0.1:20001"), "shown alone"),
+        ((".",), "state.parquet"),
+    ],
+)
+def test_a_source_that_is_none_is_one_line(arguments: tuple[str, ...], says: str, tmp_path: Path) -> None:
+    source, *rest = arguments
+    outcome = sitl_view(str(tmp_path) if source == "." else source, *rest)
+    assert outcome.returncode == 2
+    assert outcome.stderr.count("\n") == 1
+    assert says in outcome.stderr
+
+
+def test_a_replay_has_the_flights_moments(tmp_path: Path) -> None:
+    leave_flight(tmp_path)
+    recording = read_recording(tmp_path)
+    views = views_of_recording(recording, rate_hz=10.0)
+    assert [view.time_s for view in views] == pytest.approx([0.1 * k for k in range(21)])
+    assert views[10].load == pytest.approx((math.sin(1.0), math.cos(1.0), 2.1))
+    assert views[0].swing == pytest.approx(math.atan2(1.0, 1.5))
+
+
+def test_a_log_without_a_vehicle_says_so(tmp_path: Path) -> None:
+    leave_flight(tmp_path)
+    with pytest.raises(RecordingError, match="no vehicle's position"):
+        views_of_tlog(tmp_path / "link.tlog")
+
+
+def test_numbers_leave_out_what_is_not_known() -> None:
+    text = numbers(View(time_s=1.0))
+    assert "battery" not in text
+    assert "None" not in text
+    assert "50 %" in numbers(View(battery=0.5))
+
+
+@pytest.mark.parametrize("camera", ["chase", "top", "load"])
+def test_a_camera_looks_at_what_flies_from_elsewhere(camera: str) -> None:
+    view = View(vehicle=(1.0, 2.0, 3.0), load=(1.0, 2.0, 1.5))
+    aimed = aim(camera, view, 5.0)
+    assert aimed is not None
+    position, target = aimed
+    assert math.dist(position, target) > 0.1
+    assert aim("free", view, 5.0) is None
