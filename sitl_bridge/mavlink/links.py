@@ -21,6 +21,8 @@ Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]
 
 COARSE_WAIT = 0.005
 """Grain of the socket's own time-out, s: too coarse for a tick's deadline, one system call less otherwise."""
+PRECISE_RECEIVES = 1000
+"""After a short deadline that passed in vain, so many deadlines are kept to the microsecond."""
 LONGEST_WAIT = 0.1
 """A wait is cut to this (s), so that a process notices soon that it is asked to stop."""
 
@@ -113,6 +115,7 @@ class UdpLink:
         punctual: `receive` returns within microseconds of its deadline, at the price of a system call.
         """
         self._punctual = punctual
+        self._precise_left = 0  # receives that keep a short deadline precisely, because datagrams were lost
         self._timeout = 0.0
         self._peer: tuple[str, int] | None = None
         self._listener: socket.socket | None = None
@@ -151,9 +154,12 @@ class UdpLink:
             return self._waiting.popleft()
         wait = min(until - time.monotonic(), LONGEST_WAIT)
         flags = 0
-        if self._punctual or wait <= 0.0:
+        precise = self._punctual or self._precise_left > 0
+        if precise or wait <= 0.0:
             flags = int(socket.MSG_DONTWAIT)
+            self._precise_left = max(0, self._precise_left - 1)
             if wait > 0.0 and not select.select([self._socket], [], [], wait)[0]:
+                self._missed(wait)
                 return self._from_another()
         elif not self._timeout - COARSE_WAIT < wait <= self._timeout:
             self._set_timeout(wait)
@@ -162,9 +168,15 @@ class UdpLink:
                 return self._socket.recv(LARGEST_DATAGRAM, flags)
             datagram, peer = self._socket.recvfrom(LARGEST_DATAGRAM, flags)
         except OSError:  # nothing came, or an earlier datagram could not be delivered
+            self._missed(wait)
             return self._from_another()
         self._follow(peer)
         return datagram
+
+    def _missed(self, wait: float) -> None:
+        """A short deadline passed: this link loses datagrams, and its deadlines are worth a system call."""
+        if 0.0 < wait < COARSE_WAIT:
+            self._precise_left = PRECISE_RECEIVES
 
     def _from_another(self) -> bytes | None:
         """The peer pauses: what somebody else has sent to a `udpin` link, who is the peer from now on."""

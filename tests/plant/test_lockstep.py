@@ -133,6 +133,13 @@ def test_repeats_back_off_to_twice_a_second() -> None:
     assert 55 <= len(flight.network.sent["plant"]) - sent <= 75
 
 
+def test_a_round_trip_longer_than_the_timeout_is_learned() -> None:
+    """Karn's algorithm with the time-out kept: repeats end, though every first answer came too late."""
+    flight = Flight(Faults(delay_s=0.04), duration=2.0)
+    flight.fly()
+    assert flight.clock.resent_ticks < 10
+
+
 def test_continue_on_silence_flies_on_with_the_last_controls_and_counts() -> None:
     flight = Flight(Faults(), on_silence="continue")
     flight.network.run(lambda: flight.simulation.ticks_flown == 30)

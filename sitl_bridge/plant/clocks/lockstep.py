@@ -10,13 +10,11 @@ from __future__ import annotations
 from typing import Literal
 
 from sitl_bridge.plant.clocks.receiver import HilReceiver
+from sitl_bridge.plant.clocks.retransmission import RetransmissionTimer
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.simulation import Simulation
 
-SHORTEST_TIMEOUT = 0.005
-"""First wait for an answer before a tick is sent again, s; it grows with the answers' usual delay."""
-LONGEST_TIMEOUT = 0.5
 REPEATS_BEFORE_NOTICE = 3
 SILENCE_BEFORE_NOTICE = 1.0
 """And at least so long without an answer before anything is said, s."""
@@ -57,7 +55,7 @@ class Lockstep:
         self._sent_at = 0.0
         self._first_sent_at = 0.0
         self._repeats = -1  # of the current tick; -1: not sent yet
-        self._usual_delay = SHORTEST_TIMEOUT / 4
+        self._timer = RetransmissionTimer()
         self._last_controls: Array | None = None  # kept only to fly on with
 
     @property
@@ -91,7 +89,7 @@ class Lockstep:
         if self._repeats == 0:
             self._first_sent_at = now
         if self._locked:
-            self._due = now + self._timeout()
+            self._due = now + self._timer.timeout()
             if self._repeats > 0 and not self._resend:
                 return out
         return [*out, self.simulation.datagram()] if out else [self.simulation.datagram()]
@@ -128,10 +126,11 @@ class Lockstep:
         self._locked = True
         self.simulation.heard()
         if self._repeats >= 0:
-            self._due = self._sent_at + self._timeout()
+            self._due = self._sent_at + self._timer.timeout()
 
     def _repeat(self, now: float) -> None:
         """No answer within the time-out: the same tick goes out again."""
+        self._timer.expired()
         silence = self._repeats >= REPEATS_BEFORE_NOTICE
         if silence and self._on_silence == "continue" and self._last_controls is not None:
             self.unanswered_ticks += 1
@@ -143,12 +142,6 @@ class Lockstep:
         if self.simulation.started and self._resend:
             self.resent_ticks += 1
 
-    def _timeout(self) -> float:
-        patience = max(SHORTEST_TIMEOUT, 4.0 * self._usual_delay)
-        if self._repeats > 0:
-            patience *= 2.0 ** min(self._repeats, 16)
-        return min(LONGEST_TIMEOUT, patience)
-
     def _advance(self, controls: Array) -> None:
         if self.simulation.started:
             self.simulation.step(controls)
@@ -157,8 +150,8 @@ class Lockstep:
 
     def _answered(self, now: float) -> None:
         """The current tick is over, the next is due."""
-        if self._repeats == 0:  # an answer to a repeated tick may belong to any of its sendings
-            self._usual_delay += 0.125 * (now - self._sent_at - self._usual_delay)
+        if self._repeats == 0:
+            self._timer.sample(now - self._sent_at)
         self._repeats = -1
         self._due = now
         if self._pace is not None:

@@ -1,0 +1,48 @@
+"""RFC 6298 in the lockstep clock's retransmission timer."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sitl_bridge.plant.clocks.retransmission import (
+    FEWEST_ROUND_TRIPS,
+    FIRST_TIMEOUT,
+    LONGEST_TIMEOUT,
+    RetransmissionTimer,
+)
+
+
+def test_before_the_first_sample_it_waits_a_fixed_time_and_backs_off() -> None:
+    timer = RetransmissionTimer()
+    waits = []
+    for _ in range(12):
+        waits.append(timer.timeout())
+        timer.expired()
+    assert waits[:4] == pytest.approx([FIRST_TIMEOUT * 2**k for k in range(4)])
+    assert waits[-1] == LONGEST_TIMEOUT
+
+
+@given(st.lists(st.floats(1e-6, 1.0), min_size=1, max_size=60))
+def test_smoothed_round_trip_and_variation_are_those_of_the_rfc(round_trips: list[float]) -> None:
+    timer = RetransmissionTimer()
+    smoothed, variation = round_trips[0], round_trips[0] / 2
+    timer.sample(round_trips[0])
+    for sample in round_trips[1:]:
+        variation = 0.75 * variation + 0.25 * abs(smoothed - sample)
+        smoothed = 0.875 * smoothed + 0.125 * sample
+        timer.sample(sample)
+    expected = min(LONGEST_TIMEOUT, max(FEWEST_ROUND_TRIPS * smoothed, smoothed + 4 * variation))
+    assert timer.timeout() == pytest.approx(expected)
+
+
+def test_the_timeout_stays_doubled_until_there_is_a_sample() -> None:
+    timer = RetransmissionTimer()
+    timer.sample(1e-4)
+    before = timer.timeout()
+    timer.expired()
+    assert timer.timeout() == pytest.approx(2 * before)
+    assert timer.timeout() == pytest.approx(2 * before)
+    timer.sample(1e-4)
+    assert timer.timeout() <= before
