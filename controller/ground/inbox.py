@@ -141,7 +141,7 @@ class Inbox:
             return
         view = self._machine.view
         if view is None:
-            self._out.say_seldom(peer, "Set-point refused: no position yet; start the plant", now)
+            self._out.say_seldom(peer, "Set-point denied: no position yet; start the plant", now)
             return
         home = self._machine.home or (0.0, 0.0, 0.0)
         found = setpoint_of(message, to_load, self._profile, home, view)

@@ -42,7 +42,6 @@ def test_going_to_a_point_and_pausing() -> None:
         ((-1, 1, 0, NAN, ZURICH[0], NAN, 492.0), "both or neither"),
         ((-1, 1, 0, NAN, ZURICH[0] + 1, ZURICH[1], 492.0), "GF_MAX_HOR_DIST"),
         ((-1, 1, 0, NAN, ZURICH[0], ZURICH[1], 800.0), "GF_MAX_VER_DIST"),
-        ((-1, 1, 0, NAN, ZURICH[0], ZURICH[1], 489.0), "too low"),
         ((-1, 1, 0, NAN, ZURICH[0], ZURICH[1], math.inf), "infinite"),
         ((-1, 1, 0, math.inf, ZURICH[0], ZURICH[1], 492.0), "infinite"),
     ],
@@ -53,6 +52,58 @@ def test_points_that_cannot_be_flown_to_are_refused(params: tuple[float, ...], w
     assert client.command(192, *params).result == DENIED
     assert words in client.texts()[-1]
     assert rig.station.update(rig.view, rig.now) is target
+
+
+def test_a_point_that_is_too_low_for_the_load_is_raised_and_said() -> None:
+    rig, client = flying()
+    assert client.command(192, -1, 1, 0, NAN, ZURICH[0], ZURICH[1], 489.0).result == ACCEPTED
+    assert "Reposition limited: 0.9 m above home is too low for the load" in "".join(client.texts())
+    rig.run(10.0)
+    fence = rig.station.machine.fence
+    assert fence is not None
+    assert rig.view.position[2] == pytest.approx(fence.home[2] + fence.least_height, abs=0.01)
+
+
+@pytest.mark.parametrize("wait", [0.0, 1.0, 3.0])
+def test_a_point_during_take_off_is_flown_to_afterwards(wait: float) -> None:
+    """MAVSDK-Python's examples/goto.py: take-off, and a second later a point far away."""
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    assert client.command(400, 1).result == ACCEPTED
+    client.send(mavlink.MAVLink_command_long_message(1, 1, 22, 0, *(NAN,) * 7))
+    rig.run(wait)
+    there = (ZURICH[0] + 1e-4, ZURICH[1], 488.0 + 20.0)
+    client.send(mavlink.MAVLink_command_long_message(1, 1, 192, 0, -1, 1, 0, NAN, *there))
+    rig.run(0.1)
+    assert [ack.result for ack in client.got("COMMAND_ACK")] == [ACCEPTED] * 3
+    load = rig.view.load_position
+    rig.run_until(lambda: rig.view.load_position[2] > 0.3)
+    assert math.dist(rig.view.load_position[:2], load[:2]) < 0.05  # lifted where it lay
+    rig.run_until(lambda: math.dist(rig.view.position, (0.0, 11.12, 20.0)) < 0.1)
+    assert rig.station.machine.mode.name == "HOLD"
+    assert "Reposition accepted: after take-off" in client.texts()
+
+
+def test_a_point_that_waits_for_the_take_off_is_forgotten_when_something_else_is_asked_for() -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    client.command(400, 1)
+    client.command(22)
+    assert client.command(192, -1, 1, 0, NAN, ZURICH[0] + 1e-4, ZURICH[1], 500.0).result == ACCEPTED
+    assert client.command(176, 1, 4, 3).result == ACCEPTED
+    rig.run(30.0)
+    assert math.hypot(*rig.view.position[:2]) < 1.5
+
+
+def test_a_point_after_the_load_was_set_down_takes_it_up_again() -> None:
+    rig, client = flying()
+    client.command(21)
+    rig.run_until(lambda: rig.view.load_on_ground)
+    rig.run(0.1)
+    assert client.command(192, -1, 1, 0, NAN, ZURICH[0] + 1e-4, ZURICH[1], 500.0).result == ACCEPTED
+    rig.run_until(lambda: math.dist(rig.view.load_position, (0.0, 11.12, 12.0 - PROFILE.hover_length)) < 0.1)
 
 
 def test_on_the_ground_there_is_nowhere_to_go() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Follow
+from controller.ground.flight.setpoint_types import Follow, Idle
 from controller.ground.flight.trajectory import stopping_distance
 from controller.ground.telemetry.vehicle_state import profile_of
 from sitl_bridge.vehicle.files import load_vehicle
@@ -54,6 +54,45 @@ def test_offboard_position_velocity_and_trajectory() -> None:
     assert offset[1] > 0
 
 
+def test_a_set_point_on_the_ground_waits_there_until_one_is_above_it() -> None:
+    """MAVSDK-Python's examples/offboard_position_ned.py."""
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    assert client.command(400, 1).result == ACCEPTED
+    stream(rig, client, local_setpoint(0, 0, 0), 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, local_setpoint(0, 0, 0), 3.0)
+    assert rig.target == Idle(True)
+    stream(rig, client, local_setpoint(0, 0, -5), 20.0)
+    assert rig.view.position == pytest.approx((0, 0, 5), abs=0.05)
+    assert mode(rig) == "OFFBOARD"
+
+
+def test_a_velocity_lifts_off_when_it_goes_up() -> None:
+    rig = Rig()
+    client = rig.client()
+    rig.run(0.1)
+    client.command(400, 1)
+    stream(rig, client, local_setpoint(0, 0, 0, mask=0b111111000111), 0.3)
+    client.command(176, 1, 6, 0)
+    stream(rig, client, local_setpoint(0, 0, 0, mask=0b111111000111, vx=1.0), 1.0)
+    assert rig.target == Idle(True)
+    stream(rig, client, local_setpoint(0, 0, 0, mask=0b111111000111, vz=-1.0), 20.0)
+    assert rig.view.load_position[2] > 1.0
+
+
+def test_a_set_point_too_low_for_the_load_is_flown_as_low_as_may_be_and_said_once() -> None:
+    rig, client = flying()
+    stream(rig, client, local_setpoint(1, 1, 0.5), 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, local_setpoint(1, 1, 0.5), 6.0)
+    fence = rig.station.machine.fence
+    assert fence is not None
+    assert rig.view.position == pytest.approx((1, 1, fence.home[2] + fence.least_height), abs=0.05)
+    assert sum("Set-point goes down too far" in text for text in client.texts()) == 1
+
+
 def test_a_set_point_of_the_load_is_the_loads() -> None:
     rig, client = flying()
     message = local_setpoint(0, 0, -3, system=101, component=35)
@@ -71,7 +110,6 @@ def test_a_set_point_of_the_load_is_the_loads() -> None:
         (local_setpoint(math.inf, 0, -5), "beyond all bounds"),
         (local_setpoint(0, 0, -5, frame=9), "body's frame|frame 9"),
         (local_setpoint(9000, 0, -5), "GF_MAX_HOR_DIST"),
-        (local_setpoint(0, 0, -0.5), "too low"),
         (mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5), "Attitude"),
     ],
 )

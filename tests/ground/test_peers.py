@@ -112,7 +112,7 @@ def test_mavlink_1_is_answered_in_mavlink_1_until_the_peer_knows_better() -> Non
     rig.run(1.0)
     assert {raw[0] for raw in old.raw} == {0xFE}
     assert old.got("COMMAND_ACK")[0].result == 2
-    assert old.got("STATUSTEXT")[0].text.startswith("Arm or disarm refused")
+    assert old.got("STATUSTEXT")[0].text.startswith("Arm or disarm denied")
     assert {raw[0] for raw in new.raw} == {0xFD}
     old.clear()
     old.heartbeat()

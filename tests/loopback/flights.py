@@ -185,7 +185,7 @@ def mavproxy_flight(master: str, folder: Path) -> None:
         proxy.say("wp list")
         at = proxy.wait_for("47.3977420000", after=at)
         proxy.say("long COMPONENT_ARM_DISARM 7")
-        at = proxy.wait_for("Arm or disarm refused", after=at)
+        at = proxy.wait_for("Arm or disarm denied", after=at)
         proxy.say("arm throttle")
         at = proxy.wait_for("ARMED", after=at)
         proxy.say("long NAV_TAKEOFF 0 0 0 nan nan nan nan")

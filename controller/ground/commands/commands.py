@@ -163,31 +163,31 @@ def execute(command: Command, machine: Machine, requests: Requests, now: float) 
 
 def _arm(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 not in (0.0, 1.0):
-        return deny(f"Arm or disarm refused: param1 is {c.p1:g}; use 1 or 0")
+        return deny(f"Arm or disarm denied: param1 is {c.p1:g}; use 1 or 0")
     # A forced arm is an ordinary one: nothing that keeps this vehicle on the ground can be waived safely.
     return machine.arm(now) if c.p1 == 1.0 else machine.disarm(c.p2 == FORCE)
 
 
 def _takeoff(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.frame_fault and not math.isnan(c.p7):
-        return deny(f"Take-off refused: {c.frame_fault}")
+        return deny(f"Take-off denied: {c.frame_fault}")
     return machine.takeoff(_height(c, machine))
 
 
 def _set_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     # MAVSDK and QGroundControl set other bits of the base mode too; only this one says that 2 and 3 count.
     if not (0 <= c.p1 <= 255 and c.p1 == int(c.p1)) or not int(c.p1) & _CUSTOM_MODE_ENABLED:
-        return deny(f"Mode refused: param1 is {c.p1:g}; use 1 (custom mode) with PX4's main and sub mode")
+        return deny(f"Mode denied: param1 is {c.p1:g}; use 1 (custom mode) with PX4's main and sub mode")
     numbers = [0.0 if math.isnan(p) else p for p in (c.p2, c.p3)]
     if not all(math.isfinite(number) for number in numbers):
-        return deny("Mode refused: the mode is infinite")
+        return deny("Mode denied: the mode is infinite")
     found = find_mode(*numbers)
     return deny(found) if isinstance(found, str) else machine.set_mode(found, now)
 
 
 def _set_standard_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if not math.isfinite(c.p1):
-        return deny("Mode refused: the mode is not finite")
+        return deny("Mode denied: the mode is not finite")
     found = find_standard_mode(c.p1)
     return deny(found) if isinstance(found, str) else machine.set_mode(found, now)
 
@@ -198,11 +198,11 @@ def _mode(mode: Mode) -> _Handler:
 
 def _reposition(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.frame_fault and not math.isnan(c.p7):
-        return deny(f"Going there refused: {c.frame_fault}")
+        return deny(f"Reposition denied: {c.frame_fault}")
     if math.isnan(c.p5) != math.isnan(c.p6):
-        return deny("Going there refused: latitude without longitude; send both or neither")
+        return deny("Reposition denied: latitude without longitude; send both or neither")
     if abs(c.p5) > 90 or abs(c.p6) > 180:
-        return deny(f"Going there refused: {c.p5:g}, {c.p6:g} is no place; use degrees")
+        return deny(f"Reposition denied: {c.p5:g}, {c.p6:g} is no place; use degrees")
     home = machine.profile.origin.home
     east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, home.altitude))
     yaw = math.nan if math.isnan(c.p4) else yaw_from_heading(c.p4) if math.isfinite(c.p4) else c.p4
@@ -216,7 +216,7 @@ def _pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verd
         return machine.set_mode(Mode.HOLD, now)
     if c.p1 == 1.0 and machine.mission.items:
         return machine.set_mode(Mode.MISSION, now)
-    return deny(f"Pause or go on refused: param1 is {c.p1:g}; use 0, or 1 with a mission")
+    return deny(f"Pause or go on denied: param1 is {c.p1:g}; use 0, or 1 with a mission")
 
 
 def _change_speed(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -247,7 +247,7 @@ def _set_home(c: Command, machine: Machine, requests: Requests, now: float) -> V
 
 def _terminate(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 != 1.0:
-        return deny(f"Termination refused: param1 is {c.p1:g}; use 1")
+        return deny(f"Termination denied: param1 is {c.p1:g}; use 1")
     return machine.terminate()
 
 
@@ -259,13 +259,13 @@ def _prearm(c: Command, machine: Machine, requests: Requests, now: float) -> Ver
 
 def _interval(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if not math.isfinite(c.p1):
-        return deny("Message interval refused: param1 has to be a message's number")
+        return deny("Message interval denied: param1 has to be a message's number")
     return requests.set_interval(c.p1, c.p2)
 
 
 def _get_interval(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if not (0 <= c.p1 <= 0xFFFF and c.p1 == int(c.p1)):
-        return deny("Message interval refused: param1 has to be a message's number")
+        return deny("Message interval denied: param1 has to be a message's number")
     requests.send_interval(c.p1)
     return OK
 
@@ -273,7 +273,7 @@ def _get_interval(c: Command, machine: Machine, requests: Requests, now: float) 
 def _message(number: int | None = None) -> _Handler:
     def handler(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
         if number is None and not (math.isfinite(c.p1) and c.p1 == int(c.p1)):
-            return deny("Message request refused: param1 has to be a message's number")
+            return deny("Message request denied: param1 has to be a message's number")
         message_id = int(c.p1) if number is None else number
         if not requests.send_message(message_id, c.p2):
             return deny(f"Message {message_id} does not exist here, or there is nothing to say in it yet")
@@ -289,11 +289,11 @@ def _storage(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
 def _reboot(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 == 0.0:
         return OK
-    return not_now("Reboot refused: stop and start the controller's process instead")
+    return not_now("Reboot denied: stop and start the controller's process instead")
 
 
 def _calibrate(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    return deny("Calibration refused: simulated sensors need none")
+    return deny("Calibration denied: simulated sensors need none")
 
 
 def _inject_failure(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict | None:

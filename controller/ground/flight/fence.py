@@ -41,6 +41,10 @@ class Fence(NamedTuple):
             return f"{above:.1f} m above home is too low for the load; {least}"
         return ""
 
+    def raised(self, point: Triple) -> Triple:
+        """The position itself, or the lowest above it that keeps the load off the ground."""
+        return (point[0], point[1], max(point[2], self.home[2] + self.least_height))
+
     def refuses(self, point: Triple) -> str:
         """Why a vehicle with its load cannot be sent to a position, or an empty string."""
         return self.outside(point) or self.too_low(point)

@@ -35,6 +35,8 @@ from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
+_AT_FLOOR = 0.01
+"""m, by which a set-point's height may be below the floor without a word"""
 _STAY_AT_FLOOR = 0.3
 """m above the room that a stop needs, within which a body that stops at the floor goes on to"""
 
@@ -92,6 +94,8 @@ class Guidance:
         self._yaw = 0.0
         self._at_floor = False
         """The offboard client asks for less height than there may be, and has been told"""
+        self._destination: tuple[Triple, float, float] | None = None
+        """Of a reposition that waits for the end of a take-off: vehicle (m), yaw (rad), speed (m/s)"""
 
     # Where it begins
 
@@ -128,7 +132,7 @@ class Guidance:
     def end(self) -> None:
         """Disarmed."""
         self.stage = Stage.GROUND
-        self._ascent = self._descent = self._return = None
+        self._ascent = self._descent = self._return = self._destination = None
         self.takeoff_height = math.nan
 
     # What is asked of it
@@ -147,11 +151,21 @@ class Guidance:
         self.speed = math.nan
 
     def go_to(self, vehicle: Triple | None, yaw: float, speed: float, view: VehicleView) -> None:
-        """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is."""
+        """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is.
+
+        While the load is not yet controlled, this waits until it is.
+        """
+        if self.stage is not Stage.FLYING:
+            self._destination = None if vehicle is None else (vehicle, yaw, speed)
+            return
         if vehicle is not None:
             self._stay_at(self._controlled(vehicle, view), controlled_body(view))
         self._yaw = self._yaw if math.isnan(yaw) else yaw
         self.speed = speed
+
+    def forget_destination(self) -> None:
+        """Something else is asked for than the point that waits for the end of the take-off."""
+        self._destination = None
 
     def ask_takeoff_height(self, altitude: float, view: VehicleView) -> None:
         """Height (vehicle, m ENU) of the take-off to come or under way; NaN: the default, or as it is."""
@@ -230,6 +244,9 @@ class Guidance:
             if mode is Mode.TAKEOFF:
                 self._pilot.set_mode_to(Mode.HOLD)
             self.start(self._pilot.mode)
+            if self._destination is not None:
+                self.go_to(*self._destination, view)
+                self._destination = None
 
     def _clear(self, view: VehicleView) -> bool:
         fence = self.fence(view.load_attached)
@@ -345,7 +362,10 @@ class Guidance:
             x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
             position = (x, y, z)
         acceleration = asked.acceleration
-        deep = math.isnan(position[2]) and self._goes_too_deep(velocity[2], view)
+        if math.isnan(position[2]):
+            deep = self._goes_too_deep(velocity[2], view)
+        else:
+            deep = self._note_depth(position[2] < self._floor(view) - _AT_FLOOR, view)
         if deep:
             position = (position[0], position[1], self._floor(view))
             velocity, acceleration = (*velocity[:2], 0.0), (*acceleration[:2], math.nan)
@@ -370,7 +390,10 @@ class Guidance:
         """Whether a set-point's upward velocity (m/s) has to end at the floor now; says so once."""
         room = self._height(view) - self._floor(view) - (_STAY_AT_FLOOR if self._at_floor else 0.0)
         own = (view.load_velocity if view.load_attached else view.velocity)[2]
-        deep = too_deep(velocity, own, room, self._parameters)
+        return self._note_depth(too_deep(velocity, own, room, self._parameters), view)
+
+    def _note_depth(self, deep: bool, view: VehicleView) -> bool:
+        """Whether a set-point is too deep, told once for each time that it becomes so."""
         if deep and not self._at_floor:
             least = self.fence(view.load_attached).least_height
             text = f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"

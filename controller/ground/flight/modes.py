@@ -29,6 +29,10 @@ _REACTION_MODES = {Reaction.HOLD: Mode.HOLD, Reaction.RETURN: Mode.RTL, Reaction
 _SEVERITY_OF_MODE = {mode: reaction for reaction, mode in _REACTION_MODES.items()}
 
 
+_LIFTS = 0.3
+"""m, above a vehicle on the ground, from which on a set-point asks for a take-off"""
+
+
 class Reposition(NamedTuple):
     """Where to go in HOLD, m and rad ENU; NaN: as it is."""
 
@@ -100,7 +104,7 @@ class Machine:
             return OK
         faults = self.arming_faults()
         if faults or self.view is None:
-            return not_now("Arming refused: " + "; ".join(faults))
+            return not_now("Arming denied: " + "; ".join(faults))
         self._begin_flight(self.view, now)
         self.say(INFO, "Armed")
         return OK
@@ -120,7 +124,7 @@ class Machine:
     def disarm(self, force: bool) -> Verdict:
         """Disarm: on the ground, or anywhere by force."""
         if self.armed and self.flying and not force and not self.terminated and self.profile.has_ground:
-            return deny("Disarming refused: in flight; land first, or force it with param2 = 21196")
+            return deny("Disarming denied: in flight; land first, or force it with param2 = 21196")
         if self.armed:
             self._disarm("Disarmed" if not self.flying else "Disarmed by force: rotors stopped")
         self.terminated = False
@@ -129,22 +133,22 @@ class Machine:
     def terminate(self) -> Verdict:
         """Stop the rotors for good."""
         if not self.armed:
-            return deny("Termination refused: not armed")
+            return deny("Termination denied: not armed")
         self._terminate("Flight terminated: rotors stopped")
         return OK
 
     def set_mode(self, mode: Mode, now: float) -> Verdict:
         """Change the mode, now if flying, else as what will happen after arming."""
         if self.terminated:
-            return deny("Mode refused: the flight was terminated; disarm first")
+            return deny("Mode denied: the flight was terminated; disarm first")
         if mode is Mode.MISSION and not self.mission.items:
-            return deny("Mission refused: there is none; upload one first")
+            return deny("Mission denied: there is none; upload one first")
         if mode is Mode.MISSION and (fault := self.check_plan(self.mission.items)) is not None:
-            return deny(f"Mission refused: {fault.text}")
+            return deny(f"Mission denied: {fault.text}")
         if mode is Mode.OFFBOARD and not self._setpoint_fresh(now):
-            return not_now("Offboard refused: no set-points; send them at 2 Hz or more first")
+            return not_now("Offboard denied: no set-points; send them at 2 Hz or more first")
         if mode is Mode.LAND and not self.profile.has_ground:
-            return deny("Landing refused: this vehicle has no ground under it; use Hold")
+            return deny("Landing denied: this vehicle has no ground under it; use Hold")
         if mode is Mode.TAKEOFF:
             return self.takeoff(math.nan)
         self.enter(mode)
@@ -153,21 +157,23 @@ class Machine:
     def takeoff(self, altitude: float) -> Verdict:
         """Take off, now or when armed, to a height of the vehicle, m ENU; NaN: by MIS_TAKEOFF_ALT."""
         if self.terminated:
-            return deny("Take-off refused: the flight was terminated; disarm first")
+            return deny("Take-off denied: the flight was terminated; disarm first")
         if self.flying and self.stage is not Stage.ASCENT and not self._guidance.load_is_down:
-            return not_now("Take-off refused: already flying; send a point to go to instead")
+            return not_now("Take-off denied: already flying; send a point to go to instead")
         fence = self.fence
         if fence is None or self.view is None:
-            return not_now("Take-off refused: no position yet; start the plant")
+            return not_now("Take-off denied: no position yet; start the plant")
         if math.isinf(altitude):
-            return deny("Take-off refused: the altitude is no number")
+            return deny("Take-off denied: the altitude is no number")
         if not math.isnan(altitude) and altitude <= fence.home[2]:
-            above = altitude - fence.home[2]
-            return deny(f"Take-off refused: {above:.1f} m above home; altitude is above mean sea level")
+            below = fence.home[2] - altitude
+            self.say(
+                WARNING, f"Take-off altitude is {below:.1f} m below home (it is above mean sea level): raised"
+            )
         height = self._guidance.height_of_takeoff(altitude, self.view)
         fault = fence.outside((fence.home[0], fence.home[1], height))
         if fault:
-            return deny(f"Take-off refused: {fault}")
+            return deny(f"Take-off denied: {fault}")
         self.enter(Mode.TAKEOFF)
         self._guidance.ask_takeoff_height(altitude, self.view)
         return OK
@@ -176,28 +182,30 @@ class Machine:
         """Go to a point and hold there; what is NaN stays as it is."""
         view = self.view
         if self.terminated:
-            return deny("Going there refused: the flight was terminated; disarm first")
-        if view is None or not self.flying:
-            return not_now("Going there refused: not flying; take off first")
-        if self.stage is Stage.ASCENT:
-            return not_now("Going there refused: still taking off; wait until that is done (IN_AIR)")
-        if self._guidance.load_is_down:
-            return not_now("Going there refused: the load is on the ground; take off again first")
+            return deny("Reposition denied: the flight was terminated; disarm first")
+        if view is None or not (self.flying or (self.armed and self.mode is Mode.TAKEOFF)):
+            return not_now("Reposition denied: not flying; take off first")
         if not change_mode and self.mode is not Mode.HOLD:
-            return not_now(
-                f"Going there refused: in {self.mode.title}; ask for a change of mode (param2 = 1)"
-            )
+            return not_now(f"Reposition denied: in {self.mode.title}; ask for a change of mode (param2 = 1)")
         if any(math.isinf(x) for x in (*where.position, where.yaw)):
-            return deny("Going there refused: position or heading is infinite")
+            return deny("Reposition denied: position or heading is infinite")
         here = hanging_load(view, self.profile) if where.of_load else view.position
         vehicle = self._vehicle_point(filled(where.position, here), where.of_load)
         stays = all(math.isnan(x) for x in where.position)
-        fault = "" if stays or self.fence is None else self.fence.refuses(vehicle)
-        if fault:
-            return deny(f"Going there refused: {fault}")
-        speed = limited_speed(where.speed, self.parameters)
+        fence = self.fence
+        if fence is not None and not stays:
+            if fault := fence.outside(vehicle):
+                return deny(f"Reposition denied: {fault}")
+            if fault := fence.too_low(vehicle):
+                self.say(WARNING, f"Reposition limited: {fault}")
+                vehicle = fence.raised(vehicle)
+        if self.stage is Stage.GROUND:
+            self._guidance.take_off(view)  # before the mode changes: it is what the take-off was asked for
         self.enter(Mode.HOLD)
+        speed = limited_speed(where.speed, self.parameters)
         self._guidance.go_to(None if stays else vehicle, where.yaw, speed, view)
+        if self.stage is not Stage.FLYING and not stays:
+            self.say(INFO, "Reposition accepted: after take-off")
         return OK
 
     def change_speed(self, speed: float) -> Verdict:
@@ -205,7 +213,7 @@ class Machine:
         largest = self.parameters["MPC_XY_VEL_MAX"]
         if speed != -1 and not 0 < speed <= largest:
             return deny(
-                f"Speed {speed:g} m/s refused: use up to {largest:g} (MPC_XY_VEL_MAX), or -1 for the default"
+                f"Speed {speed:g} m/s denied: use up to {largest:g} (MPC_XY_VEL_MAX), or -1 for the default"
             )
         self._guidance.speed = self.mission.speed = math.nan if speed == -1 else speed
         return OK
@@ -214,14 +222,13 @@ class Machine:
         """An offboard set-point; returns why it is not taken, or an empty string."""
         fence = self.fence
         if fence is None or self.view is None:
-            return "Set-point refused: no position yet; start the plant"
+            return "Set-point denied: no position yet; start the plant"
         here = hanging_load(self.view, self.profile) if setpoint.of_load else self.view.position
         point = self._vehicle_point(filled(setpoint.position, here), setpoint.of_load)
         asked = any(not math.isnan(x) for x in setpoint.position)
-        low = not math.isnan(setpoint.position[2])
-        fault = (fence.outside(point) if asked else "") or (fence.too_low(point) if low else "")
+        fault = fence.outside(point) if asked else ""
         if fault:
-            return f"Set-point refused: {fault}"
+            return f"Set-point denied: {fault}"
         return self.offboard.offer(setpoint, sender, now, self.parameters["COM_OF_LOSS_T"])
 
     def check_plan(self, items: tuple[Item, ...]) -> Fault | None:
@@ -287,7 +294,7 @@ class Machine:
 
     def _on_ground(self, view: VehicleView, now: float) -> None:
         if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (
-            self.mode is Mode.OFFBOARD and self._setpoint_fresh(now)
+            self.mode is Mode.OFFBOARD and self._setpoint_fresh(now) and self._setpoint_lifts(view)
         ):
             self._guidance.take_off(view)
             return
@@ -305,6 +312,7 @@ class Machine:
         """Change the mode; in flight it begins now."""
         if self.mode is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.pause()
+        self._guidance.forget_destination()
         again = mode is self.mode and mode not in (Mode.HOLD, Mode.RTL)
         self.set_mode_to(mode)
         if mode not in (Mode.LAND, Mode.RTL):
@@ -325,6 +333,14 @@ class Machine:
 
     def _setpoint_fresh(self, now: float) -> bool:
         return self.offboard.fresh(now, self.parameters["COM_OF_LOSS_T"])
+
+    def _setpoint_lifts(self, view: VehicleView) -> bool:
+        """Whether the offboard client wants the vehicle off the ground, by the axes that PX4 looks at."""
+        asked = self.offboard.latest
+        if asked is None:
+            return False
+        height = self._vehicle_point(asked.position, asked.of_load)[2]
+        return height > view.position[2] + _LIFTS or asked.velocity[2] > 0.0 or asked.acceleration[2] > 0.0
 
     def _disarm(self, text: str) -> None:
         self.armed = False

@@ -144,7 +144,7 @@ class Missions:
         if fault is None:
             self.items = items
         else:
-            say(f"Mission refused: {fault.text}")
+            say(f"Mission denied: {fault.text}")
         result = mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result
         while len(self._finished) >= MOST_TRANSFERS:
             del self._finished[next(iter(self._finished))]

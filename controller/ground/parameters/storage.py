@@ -39,7 +39,7 @@ class StoredParameters:
             return OK
         if action not in (LOAD, SAVE):
             return deny(
-                f"Parameter storage refused: param1 is {action:g}; use 0 (load), 1 (save) or 2 (reset)"
+                f"Parameter storage denied: param1 is {action:g}; use 0 (load), 1 (save) or 2 (reset)"
             )
         if self._file is None:
             return deny("Parameters have no file to be kept in; start the controller with --parameters FILE")

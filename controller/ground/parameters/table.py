@@ -75,7 +75,7 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("MPC_ACC_HOR", 2.0, 0.2, 10.0, "m/s^2", "Acceleration with which the vehicle comes to a hold"),
     Parameter("MPC_ACC_HOR_MAX", 4.0, 0.5, 15.0, "m/s^2", "Largest acceleration on a trajectory of set-points, and never more than the rotors can give: larger ones are limited"),
     Parameter("NAV_ACC_RAD", 1.0, 0.05, 200.0, "m", "Radius in which vehicle and load have to be for a way-point to count as reached"),
-    Parameter("LND_CLEARANCE", 0.5, 0.1, 20.0, "m", "Least height of the hanging load above home's ground; lower set-points are refused"),
+    Parameter("LND_CLEARANCE", 0.5, 0.1, 20.0, "m", "Least height of the hanging load above home's ground; lower set-points are raised to it"),
     Parameter("LND_BESIDE", 0.8, 0.2, 20.0, "m", "Distance from the load at which the vehicle lands; at most 0.6 of the cable"),
     # Return
     Parameter("RTL_RETURN_ALT", 6.0, 1.0, 150.0, "m", "Height above home on the way back"),
