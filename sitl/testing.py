@@ -19,7 +19,7 @@ from pathlib import Path
 from sitl.flights.free_ports import free_ports
 
 START_PATIENCE = 120.0
-"""s; the first start on a machine compiles"""
+"""s without another line from the vehicle; a first start says each part that it compiles"""
 STOP_PATIENCE = 20.0
 
 
@@ -84,8 +84,11 @@ def flying_vehicle(
 
 
 def _wait_for(process: subprocess.Popen[bytes], log: Path, text: str) -> None:
-    deadline = time.monotonic() + START_PATIENCE
+    """Wait for a text in the log. Raises RuntimeError when the process ends, or says nothing new for long."""
+    seen, deadline = "", time.monotonic() + START_PATIENCE
     while text not in (said := log.read_text(errors="replace")):
+        if said != seen:
+            seen, deadline = said, time.monotonic() + START_PATIENCE
         if process.poll() is not None or time.monotonic() > deadline:
             raise RuntimeError(f"the vehicle did not start:\n{said}")
         time.sleep(0.05)

@@ -11,6 +11,7 @@ from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LO
 from sitl.command_line.argument_types import host_and_port, link_address, number, ports, whole
 from sitl.command_line.export import add_export
 from sitl.command_line.view import add_view
+from sitl.command_line.warmup import add_warmup
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
 from sitl_bridge.vehicle.files import preset_names, vehicle_names
 
@@ -105,6 +106,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     add_export(commands)
     add_view(commands)
+    add_warmup(commands)
     bench = commands.add_parser(
         "bench",
         help="measure speed, and print ratios against the bare round trip",

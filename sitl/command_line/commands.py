@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from sitl.command_line.arguments import build_parser
 from sitl.command_line.export import run_export
 from sitl.command_line.view import run_view
+from sitl.command_line.warmup import run_warmup
 from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 from sitl_bridge.process import Speaker, StopRequest
@@ -256,6 +257,7 @@ COMMANDS = {
     "paper": _paper,
     "export": run_export,
     "view": run_view,
+    "warmup": run_warmup,
 }
 
 

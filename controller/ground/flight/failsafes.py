@@ -22,7 +22,6 @@ class Reaction(IntEnum):
     RETURN = 2
     LAND = 3
     TERMINATE = 4
-    DISARM = 5
 
 
 class Trigger(NamedTuple):
@@ -33,18 +32,9 @@ class Trigger(NamedTuple):
     text: str
 
 
-_LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE, 6: Reaction.DISARM}
+_LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE}
 _FENCE = {2: Reaction.HOLD, 3: Reaction.RETURN, 4: Reaction.TERMINATE, 5: Reaction.LAND}
-_OFFBOARD = {
-    0: Reaction.HOLD,
-    1: Reaction.HOLD,
-    2: Reaction.HOLD,
-    3: Reaction.RETURN,
-    4: Reaction.LAND,
-    5: Reaction.HOLD,
-    6: Reaction.TERMINATE,
-    7: Reaction.DISARM,
-}
+_OFFBOARD = {3: Reaction.RETURN, 4: Reaction.LAND, 5: Reaction.HOLD, 6: Reaction.TERMINATE}
 
 
 class Situation(NamedTuple):
@@ -182,5 +172,4 @@ def _word(reaction: Reaction) -> str:
         Reaction.RETURN: "returning",
         Reaction.LAND: "landing",
         Reaction.TERMINATE: "rotors stopped",
-        Reaction.DISARM: "disarming",
     }[reaction]
