@@ -16,7 +16,7 @@ from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Peer, Peers
 from controller.ground.missions import transfer as mission_protocol
 from controller.ground.missions.transfer import Client, Missions
-from controller.ground.parameters.protocol import Parameters
+from controller.ground.parameters.protocol import HASH_CHECK, Parameters
 from controller.ground.telemetry import messages as telemetry
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
@@ -98,6 +98,9 @@ class Inbox:
 
     def _parameter_set(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if not self._addressed(message):
+            return
+        if message.param_id == HASH_CHECK:
+            self._parameters.stop_list(peer.address)
             return
         reply, say = self._talk(frame, peer, now)
         raw = frame.payload[:4].ljust(4, b"\0")

@@ -5,14 +5,17 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Terminate
+from controller.ground.flight.setpoint_types import Idle, Terminate
 from controller.ground.link.peers import SILENCE
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.in_flight import ACCEPTED, flying, local_setpoint, mode, set_parameter, stream
 from tests.ground.rig import Rig
 
 
-@pytest.mark.parametrize(("action", "expected"), [(5, "HOLD"), (3, "RTL"), (4, "LAND"), (6, "TERMINATION")])
+@pytest.mark.parametrize(
+    ("action", "expected"),
+    [(0, "HOLD"), (1, "HOLD"), (2, "HOLD"), (5, "HOLD"), (3, "RTL"), (4, "LAND"), (6, "TERMINATION")],
+)
 def test_offboard_lost(action: int, expected: str) -> None:
     rig, client = flying()
     set_parameter(rig, client, "COM_OBL_RC_ACT", action)
@@ -25,6 +28,17 @@ def test_offboard_lost(action: int, expected: str) -> None:
     rig.run(0.3)
     assert mode(rig) == expected
     assert any("No offboard set-point" in text for text in client.texts())
+
+
+def test_offboard_lost_and_disarmed() -> None:
+    rig, client = flying()
+    set_parameter(rig, client, "COM_OBL_RC_ACT", 7)
+    message = local_setpoint(3, 2, -5)
+    stream(rig, client, message, 0.3)
+    client.command(176, 1, 6, 0)
+    rig.run(1.5)
+    assert not rig.station.armed
+    assert rig.target == Idle(False)
 
 
 @pytest.mark.parametrize("timeout", [10.0, 40.0])

@@ -11,7 +11,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.parameters.file import ParameterFile
-from controller.ground.parameters.table import BY_NAME, TABLE, Parameter, markdown
+from controller.ground.parameters.parameter import Parameter
+from controller.ground.parameters.protocol import HASH_CHECK
+from controller.ground.parameters.table import BY_NAME, TABLE, markdown
 from controller.pilot.ground_link import GroundLink, GroundOptions, Ports
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.rig import Channel, Client, Rig
@@ -91,10 +93,93 @@ def test_a_list_is_complete_and_paced() -> None:
     client = rig.client()
     client.send(mavlink.MAVLink_param_request_list_message(1, 1))
     rig.run(1.0)
-    values = client.got("PARAM_VALUE")
+    first, *values = client.got("PARAM_VALUE")
+    assert first.param_id == HASH_CHECK  # as PX4 does: a client that has the same hash stops the list
     assert [v.param_index for v in values] == list(range(len(TABLE)))
     assert {v.param_count for v in values} == {len(TABLE)}
     assert {v.param_id: value_of(v) for v in values} == pytest.approx({p.name: p.default for p in TABLE})
+
+
+def nuttx_crc32(data: bytes, crc: int) -> int:
+    """crc32part() as NuttX has it, bit by bit: the reflected polynomial 0xEDB88320, no inversion."""
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0xEDB88320 if crc & 1 else 0)
+    return crc
+
+
+def expected_hash(values: dict[str, float]) -> int:
+    crc = 0
+    for name in sorted(values):
+        kind = "<i" if BY_NAME[name].is_integer else "<f"
+        value = int(values[name]) if BY_NAME[name].is_integer else values[name]
+        crc = nuttx_crc32(struct.pack(kind, value), nuttx_crc32(name.encode(), crc))
+    return crc
+
+
+def test_the_hash_of_all_parameters_is_px4s_and_asked_for_without_a_warning() -> None:
+    rig = Rig()
+    client = rig.client()
+    message = read(client, HASH_CHECK)
+    assert message.param_type == mavlink.MAV_PARAM_TYPE_UINT32
+    assert (message.param_count, message.param_index) == (len(TABLE), 0xFFFF)
+    before = struct.unpack("<I", struct.pack("<f", message.param_value))[0]
+    assert before == expected_hash(rig.station.parameters.values())
+    assert client.texts() == []
+    assert rig.station.parameters.set("MIS_TAKEOFF_ALT", 7.5) == ""
+    after = read(client, HASH_CHECK).param_value
+    assert struct.pack("<f", after) == struct.pack("<I", expected_hash(rig.station.parameters.values()))
+    assert after != message.param_value
+
+
+def test_a_client_that_has_the_same_hash_stops_the_list() -> None:
+    rig = Rig()
+    client = rig.client()
+    client.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    rig.run(0.04)
+    client.send(set_message(HASH_CHECK, 0, mavlink.MAV_PARAM_TYPE_UINT32))
+    rig.run(0.02)
+    client.clear()
+    rig.run(1.0)
+    assert client.got("PARAM_VALUE") == []
+    assert client.texts() == []
+
+
+SET_BY_SCRIPTS = {
+    "COM_RC_IN_MODE": (0, 1, 2, 3, 4),
+    "COM_OBL_RC_ACT": range(8),
+    "COM_RCL_EXCEPT": (0, 4, 7),
+    "NAV_RCL_ACT": (1, 2, 3, 5, 6),
+    "NAV_DLL_ACT": (0, 1, 2, 3, 5, 6),
+    "CBRK_SUPPLY_CHK": (894281, 0),
+    "MIS_TAKEOFF_REQ": (0, 1),
+    "MIS_DIST_1WP": (0.0, 900.0, 10000.0),
+    "MPC_TILTMAX_AIR": (20.0, 45.0, 60.0),
+    "MPC_JERK_AUTO": (4.0, 30.0),
+    "MPC_YAW_MODE": (0, 3, 4),
+    "SIM_BAT_DRAIN": (60.0, 86400.0),
+    "SYS_HAS_GPS": (0, 1),
+    "COM_ARM_WO_GPS": (0, 1),
+    "FLW_TGT_HT": (8.0, 15.0),
+    "FLW_TGT_DST": (2.0, 8.0),
+    "FLW_TGT_FA": (0.0, -180.0, 180.0),
+    "FLW_TGT_ALT_M": (0, 1, 2),
+    "FLW_TGT_MAX_VEL": (5.0, 10.0),
+    "FLW_TGT_RS": (0.02, 0.5),
+}
+
+
+@pytest.mark.parametrize("name", SET_BY_SCRIPTS)
+def test_what_scripts_set_on_a_px4_is_taken_and_given_back(name: str) -> None:
+    rig = Rig()
+    client = rig.client()
+    for value in SET_BY_SCRIPTS[name]:
+        kind = INT32 if BY_NAME[name].is_integer else REAL32
+        client.send(set_message(name, value, kind))
+        rig.run(0.04)
+        assert value_of(client.got("PARAM_VALUE")[-1]) == pytest.approx(value)
+    assert client.texts() == []
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -109,7 +194,7 @@ def test_a_client_that_asks_again_gets_everything_over_a_lossy_link(seed: int) -
         for index in missing:
             client.send(mavlink.MAVLink_param_request_read_message(1, 1, b"", index))
         rig.run(0.1)
-    assert {v.param_id for v in client.got("PARAM_VALUE")} == set(BY_NAME)
+    assert {v.param_id for v in client.got("PARAM_VALUE")} - {HASH_CHECK} == set(BY_NAME)
 
 
 def test_a_value_is_set_and_echoed_to_every_client() -> None:

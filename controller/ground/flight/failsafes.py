@@ -22,6 +22,7 @@ class Reaction(IntEnum):
     RETURN = 2
     LAND = 3
     TERMINATE = 4
+    DISARM = 5
 
 
 class Trigger(NamedTuple):
@@ -32,9 +33,18 @@ class Trigger(NamedTuple):
     text: str
 
 
-_LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE}
+_LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE, 6: Reaction.DISARM}
 _FENCE = {2: Reaction.HOLD, 3: Reaction.RETURN, 4: Reaction.TERMINATE, 5: Reaction.LAND}
-_OFFBOARD = {3: Reaction.RETURN, 4: Reaction.LAND, 5: Reaction.HOLD, 6: Reaction.TERMINATE}
+_OFFBOARD = {
+    0: Reaction.HOLD,
+    1: Reaction.HOLD,
+    2: Reaction.HOLD,
+    3: Reaction.RETURN,
+    4: Reaction.LAND,
+    5: Reaction.HOLD,
+    6: Reaction.TERMINATE,
+    7: Reaction.DISARM,
+}
 
 
 class Situation(NamedTuple):
@@ -172,4 +182,5 @@ def _word(reaction: Reaction) -> str:
         Reaction.RETURN: "returning",
         Reaction.LAND: "landing",
         Reaction.TERMINATE: "rotors stopped",
+        Reaction.DISARM: "disarming",
     }[reaction]

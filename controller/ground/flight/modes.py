@@ -277,6 +277,9 @@ class Machine:
             self.say(trigger.severity, trigger.text)
             if trigger.reaction is Reaction.TERMINATE:
                 self._terminate("")
+            elif trigger.reaction is Reaction.DISARM:
+                self._disarm("Disarmed by a failsafe: rotors stopped")
+                return
             elif trigger.reaction > _SEVERITY_OF_MODE.get(self.mode, Reaction.NONE):
                 ground = self.profile.has_ground or trigger.reaction is not Reaction.LAND
                 self.enter(_REACTION_MODES[trigger.reaction] if ground else Mode.HOLD)

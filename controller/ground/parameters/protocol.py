@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import zlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -11,18 +12,24 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Address
-from controller.ground.parameters.table import BY_NAME, TABLE, Parameter
+from controller.ground.parameters.parameter import Parameter
+from controller.ground.parameters.table import BY_NAME, TABLE
 
 ERROR_DOES_NOT_EXIST: int = mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 ERROR_OUT_OF_RANGE: int = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
 ERROR_TYPE_MISMATCH = 7
 """MAV_PARAM_ERROR_TYPE_MISMATCH of the current dialect"""
+HASH_CHECK = "_HASH_CHECK"
+"""Not a parameter: by this name PX4 gives the hash over all of them, and clients tell it to stop a list"""
+_NO_INDEX = 0xFFFF
 LIST_RATE = 500.0
 """Hz, at which a list goes out: a burst would overflow a client's socket buffer"""
 
 Reply = Callable[[Any], None]
 Say = Callable[[str], None]
 
+_HASH_FIRST = -1
+"""Place in a list, of the hash that goes before the parameters"""
 _INDEX = {parameter.name: index for index, parameter in enumerate(TABLE)}
 
 
@@ -90,7 +97,7 @@ class Parameters:
 
     def request_list(self, peer: Address, now: float) -> None:
         """PARAM_REQUEST_LIST: from the beginning, also when a list is under way."""
-        self._lists[peer] = (0, now)
+        self._lists[peer] = (_HASH_FIRST, now)
 
     def request_read(self, name: str, index: int, reply: Reply, say: Say) -> None:
         """PARAM_REQUEST_READ: by name if the index is -1."""
@@ -100,6 +107,8 @@ class Parameters:
             else:
                 say(f"Parameter {index}: no such index; there are {len(TABLE)}")
                 reply(_error("", index, ERROR_DOES_NOT_EXIST))
+        elif name == HASH_CHECK:
+            reply(self._hash_message())
         elif name in BY_NAME:
             reply(self._value_message(BY_NAME[name]))
         else:
@@ -125,16 +134,38 @@ class Parameters:
             return False
         return True
 
+    def stop_list(self, peer: Address) -> None:
+        """The peer has what is still to come (PARAM_SET of `HASH_CHECK`)."""
+        self._lists.pop(peer, None)
+
+    def hash(self) -> int:
+        """CRC-32 over the names and the four-byte values of all parameters by name, as PX4 computes it."""
+        crc = 0
+        for name in sorted(BY_NAME):
+            # PX4 begins with 0 and does not invert at the end; zlib inverts at both.
+            crc = zlib.crc32(name.encode() + self._value_bytes(BY_NAME[name]), crc ^ 0xFFFFFFFF) ^ 0xFFFFFFFF
+        return crc
+
+    def _hash_message(self) -> Packed:
+        """PARAM_VALUE of the hash."""
+        name, kind = HASH_CHECK.encode(), mavlink.MAV_PARAM_TYPE_UINT32
+        message = mavlink.MAVLink_param_value_message
+        payload = struct.pack("<IHH16sB", self.hash(), len(TABLE), _NO_INDEX, name, kind)
+        return Packed(payload, message.id, message.crc_extra)
+
     def value_message(self, name: str) -> Packed:
         """PARAM_VALUE of a parameter."""
         return self._value_message(BY_NAME[name])
 
     def _value_message(self, p: Parameter) -> Packed:
-        # Packed here: an INT32's bytes are no float that Python would pass on unchanged (signalling NaN).
-        value = struct.pack("<i", int(self[p.name])) if p.is_integer else struct.pack("<f", self[p.name])
+        value = self._value_bytes(p)
         rest = struct.pack("<HH16sB", len(TABLE), _INDEX[p.name], p.name.encode(), _kind(p))
         message = mavlink.MAVLink_param_value_message
         return Packed(value + rest, message.id, message.crc_extra)
+
+    def _value_bytes(self, p: Parameter) -> bytes:
+        # Packed here: an INT32's bytes are no float that Python would pass on unchanged (signalling NaN).
+        return struct.pack("<i", int(self[p.name])) if p.is_integer else struct.pack("<f", self[p.name])
 
     # What is due of lists
 
@@ -148,6 +179,9 @@ class Parameters:
                 continue
             most = 1 + int(max(0.0, min(now - due, 0.02)) * LIST_RATE)
             count = most if now >= due else 0
+            if index == _HASH_FIRST and count:
+                out.append((peer, self._hash_message()))
+                index = 0
             for p in TABLE[index : index + count]:
                 out.append((peer, self._value_message(p)))
             index += count

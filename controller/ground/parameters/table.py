@@ -1,4 +1,4 @@
-"""Every parameter of the vehicle: the only place where names, ranges, units, meanings and defaults stand.
+"""Every parameter of the vehicle: names, ranges, units, meanings and defaults stand here, or in `px4_table`.
 
 PARAM_* answers, the defaults and docs/parameters.md come from here. Names are PX4's where PX4 has the same
 thing, so that ground stations show it where people look for it.
@@ -8,51 +8,36 @@ thing, so that ground stations show it where people look for it.
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
+from controller.ground.parameters.parameter import Parameter
+from controller.ground.parameters.px4_table import PX4_TABLE
 
-
-class Parameter(NamedTuple):
-    """One parameter. It is an integer (INT32) if its default is an `int`, else REAL32."""
-
-    name: str
-    default: float
-    minimum: float
-    maximum: float
-    unit: str
-    description: str
-    choices: tuple[tuple[int, str], ...] = ()
-    """Allowed values with their meanings, where only some are allowed."""
-
-    @property
-    def is_integer(self) -> bool:
-        """Whether it is INT32 on the wire."""
-        return isinstance(self.default, int)
-
-    def shown(self, value: float) -> str:
-        """A value for a person; an integer in all its digits."""
-        whole = self.is_integer and math.isfinite(value) and value == int(value)
-        return str(int(value)) if whole else f"{value:g}"
-
-    @property
-    def range(self) -> str:
-        """What it may be."""
-        if self.choices:
-            return ", ".join(f"{number} {word}" for number, word in self.choices)
-        return f"{self.shown(self.minimum)} to {self.shown(self.maximum)}"
-
-
-_LINK_ACTIONS = ((0, "none"), (1, "hold"), (2, "return"), (3, "land"), (5, "terminate"))
+_LINK_ACTIONS = ((0, "none"), (1, "hold"), (2, "return"), (3, "land"), (5, "terminate"), (6, "disarm"))
 _FENCE_ACTIONS = ((0, "none"), (1, "warn"), (2, "hold"), (3, "return"), (4, "terminate"), (5, "land"))
-_OFFBOARD_ACTIONS = ((3, "return"), (4, "land"), (5, "hold"), (6, "terminate"))
+_OFFBOARD_ACTIONS = (
+    (0, "position mode, or hold"),
+    (1, "altitude mode, or hold"),
+    (2, "hold"),
+    (3, "return"),
+    (4, "land"),
+    (5, "hold"),
+    (6, "terminate"),
+    (7, "disarm"),
+)
 _BATTERY_ACTIONS = ((0, "warn"), (2, "land when critical"), (3, "return when critical, land in emergency"))
 _HIL_ACTIONS = ((0, "go on when it is back"), (1, "hold when it is back"), (4, "terminate"))
+_STICKS = (
+    (0, "remote control only"),
+    (1, "joystick only"),
+    (2, "both, with fallback"),
+    (3, "both, the first is kept"),
+    (4, "none"),
+)
 _WEIGHT = "Factor on the default weight in the LQR's cost; the gains are designed again in flight. "
 
-TABLE: tuple[Parameter, ...] = (
+_USED: tuple[Parameter, ...] = (
     # Who the vehicle is. QGroundControl's pages read these.
     Parameter("SYS_AUTOSTART", 10016, 1, 99999, "", "Airframe that ground stations show (not 0: they would ask to set it up)"),
-    Parameter("COM_RC_IN_MODE", 1, 1, 1, "", "Source of manual control; there is none but a joystick that is ignored", ((1, "joystick only"),)),
+    Parameter("COM_RC_IN_MODE", 1, 0, 4, "", "Source of manual control; there is no remote control but a joystick", _STICKS),
     Parameter("RC_MAP_ROLL", 0, 0, 18, "", "Remote-control channel; no effect, read by ground stations"),
     Parameter("RC_MAP_PITCH", 0, 0, 18, "", "Remote-control channel; no effect, read by ground stations"),
     Parameter("RC_MAP_YAW", 0, 0, 18, "", "Remote-control channel; no effect, read by ground stations"),
@@ -91,9 +76,9 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("COM_HIL_LOSS_T", 2.0, 0.05, 30.0, "s", "Without HIL_SENSOR for so long, the link to the plant is lost"),
     Parameter("COM_HIL_LOSS_ACT", 1, 0, 4, "", "Reaction to a lost link to the plant", _HIL_ACTIONS),
     Parameter("COM_OF_LOSS_T", 1.0, 0.05, 60.0, "s", "Without a set-point for so long, offboard control is lost"),
-    Parameter("COM_OBL_RC_ACT", 5, 3, 6, "", "Reaction to lost offboard set-points", _OFFBOARD_ACTIONS),
+    Parameter("COM_OBL_RC_ACT", 5, 0, 7, "", "Reaction to lost offboard set-points", _OFFBOARD_ACTIONS),
     Parameter("COM_DL_LOSS_T", 10.0, 1.0, 300.0, "s", "Without any ground station's HEARTBEAT for so long, all are lost"),
-    Parameter("NAV_DLL_ACT", 2, 0, 5, "", "Reaction to the loss of the last ground station, if one has been heard since arming", _LINK_ACTIONS),
+    Parameter("NAV_DLL_ACT", 2, 0, 6, "", "Reaction to the loss of the last ground station, if one has been heard since arming", _LINK_ACTIONS),
     Parameter("COM_LOW_BAT_ACT", 3, 0, 3, "", "Reaction to a low battery", _BATTERY_ACTIONS),
     Parameter("BAT_LOW_THR", 0.15, 0.02, 0.8, "", "Remaining charge (0..1) that is low: a warning"),
     Parameter("BAT_CRIT_THR", 0.07, 0.01, 0.5, "", "Remaining charge (0..1) that is critical"),
@@ -114,7 +99,16 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("LQR_R_MOMENT", 1.0, 1e-3, 1e3, "", _WEIGHT + "Moments"),
 )  # fmt: skip
 
+TABLE: tuple[Parameter, ...] = _USED + PX4_TABLE
+"""Every parameter, in the order of its index on the wire."""
+
 BY_NAME: dict[str, Parameter] = {parameter.name: parameter for parameter in TABLE}
+
+
+def _rows(parameters: tuple[Parameter, ...]) -> list[str]:
+    return [
+        f"| `{p.name}` | {p.shown(p.default)} | {p.range} | {p.unit} | {p.description} |" for p in parameters
+    ]
 
 
 def markdown() -> str:
@@ -130,8 +124,18 @@ def markdown() -> str:
         "| name | default | range | unit | meaning |",
         "|---|---|---|---|---|",
     ]
-    for p in TABLE:
-        lines.append(f"| `{p.name}` | {p.shown(p.default)} | {p.range} | {p.unit} | {p.description} |")
+    lines += _rows(_USED)
+    lines += [
+        "",
+        "## Kept, without effect",
+        "",
+        "PX4's parameters that scripts set and that have nothing to act on here: a value in range is kept and given back,",
+        "and changes nothing about the flight.",
+        "",
+        "| name | default | range | unit | what it is on PX4 |",
+        "|---|---|---|---|---|",
+    ]
+    lines += _rows(PX4_TABLE)
     return "\n".join(lines) + "\n"
 
 

@@ -99,7 +99,7 @@ def all_parameters(client: PyMav) -> set[str]:
     while len(found) < len(TABLE):
         assert time.monotonic() < deadline, f"{len(found)} of {len(TABLE)}"
         for message in client.listen(0.5):
-            if message.get_type() == "PARAM_VALUE":
+            if message.get_type() == "PARAM_VALUE" and message.param_index < len(TABLE):
                 found[message.param_index] = message.param_id
         for index in set(range(len(TABLE))) - set(found):
             lost += 1
