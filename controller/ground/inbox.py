@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import WARNING, Notice
 from controller.ground.commands.service import CommandService
-from controller.ground.commands.setpoints import setpoint_of
+from controller.ground.commands.setpoints import attitude_setpoint_of, setpoint_of
 from controller.ground.flight.modes import Machine
 from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import Packed
@@ -26,7 +26,6 @@ _BROADCAST = 0
 _FTP_ANSWERS = 128
 """Opcodes of FTP from here on are answers, ACK and NAK"""
 _NOT_FLOWN = {
-    mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: "Attitude set-points are not supported; send positions",
     mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
     mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
 }
@@ -153,6 +152,15 @@ class Inbox:
         if fault:
             self._out.say_seldom(peer, fault, now)
 
+    def _attitude_setpoint(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if not self._addressed(message):
+            return
+        found = attitude_setpoint_of(message)
+        sender = (peer.address, frame.system, frame.component)
+        fault = found if isinstance(found, str) else self._machine.offer_attitude(found, sender, now)
+        if fault:
+            self._out.say_seldom(peer, fault, now)
+
     def _data_stream(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if self._addressed(message):
             on = message.start_stop == 1
@@ -165,7 +173,10 @@ class Inbox:
 
     def _time_sync(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if message.tc1 == 0:
-            self._out.send(peer, mavlink.MAVLink_timesync_message(int(now * 1e9), message.ts1), now)
+            # On the clock of the telemetry's time stamps, so that a companion knows the age of a state.
+            view = self._machine.view
+            time = now if view is None else view.time
+            self._out.send(peer, mavlink.MAVLink_timesync_message(int(time * 1e9), message.ts1), now)
 
     def _refuse_ftp(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         """FTP's negative acknowledgement, at once: clients then use the other protocols."""
@@ -192,6 +203,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: Inbox._set_current_item,
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: Inbox._setpoint,
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: Inbox._setpoint,
+    mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: Inbox._attitude_setpoint,
     mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
     mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,

@@ -24,8 +24,9 @@ from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LO
 from controller.ground.link.signing import Signing
 from controller.ground.missions.transfer import Missions
 from controller.ground.parameters.file import ParameterFile
-from controller.ground.parameters.protocol import Parameters
+from controller.ground.parameters.protocol import Parameters, single
 from controller.ground.parameters.storage import StoredParameters
+from controller.ground.parameters.table import BY_NAME
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.load_relay import LoadRelay
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
@@ -60,7 +61,9 @@ def local_ports(instance: int) -> tuple[int, int]:
 
 def _own_defaults(profile: Profile) -> dict[str, float]:
     """Defaults that are this vehicle's own."""
-    return {} if profile.battery_cells is None else {"BAT1_N_CELLS": profile.battery_cells}
+    hover = BY_NAME["MPC_THR_HOVER"]
+    own = {"MPC_THR_HOVER": single(min(max(profile.hover_thrust, hover.minimum), hover.maximum))}
+    return own if profile.battery_cells is None else own | {"BAT1_N_CELLS": profile.battery_cells}
 
 
 class Station:

@@ -17,6 +17,13 @@ def other_body(before: Design, after: Design, old: Memory, new: Memory) -> None:
     new["past"][0] = old["past"][0] + change
 
 
+def from_wrench(after: Design, achieved: Array, new: Memory) -> None:
+    """From a law of another kind, whose rotors give `achieved` (4,), N and N m."""
+    under_way = achieved - after["hover_wrench"][0]
+    new["rotors"][0] = under_way
+    new["past"][0] = under_way
+
+
 def other_gains(before: Design, after: Design, memory: Memory, work: Work, yaw: float) -> None:
     """From one set of gains to another for the same body: the integral becomes what gives the same wrench.
 

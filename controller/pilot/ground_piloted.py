@@ -15,7 +15,16 @@ from pymavlink.dialects.v20 import common
 from controller.design.catalogue import EVEN, Emphasis, guided_designs
 from controller.feedback.assessment import Assessor, Contact, ExactAssessor
 from controller.ground.commands.result import INFO, WARNING, Notice
-from controller.ground.flight.setpoint_types import Body, Follow, Goto, Idle, Land, Target, Terminate
+from controller.ground.flight.setpoint_types import (
+    Attitude,
+    Body,
+    Follow,
+    Goto,
+    Idle,
+    Land,
+    Target,
+    Terminate,
+)
 from controller.ground.flight.trajectory import Limits, Trajectory
 from controller.ground.link.packing import decoded
 from controller.ground.station import Station
@@ -23,6 +32,7 @@ from controller.ground.telemetry.vehicle_state import VehicleView
 from controller.hil.ticks import TickReader
 from controller.law import bumpless_transfer as handover
 from controller.law.allocation import allocation
+from controller.law.attitude_law import attitude_law, attitude_step, set_limits
 from controller.law.control_law import WORK, Design, Memory, engaged_memory
 from controller.law.control_step import control_step
 from controller.law.state import (
@@ -106,6 +116,12 @@ class GuidedAutopilot:
         self._most_acceleration = max(LEAST_ACCELERATION, spare * vehicle.gravity)
         self._work = np.zeros(1, dtype=WORK)
         self._estimate = np.zeros(18)
+        self._attitude_law = attitude_law(vehicle, rate_hz)
+        self._attitude_step = attitude_step.bind(
+            self._attitude_law, self._allocation, self._work, self._estimate, self._controls
+        )
+        self._steered = False
+        """The client steers attitude and thrust: the attitude law flies"""
         self._law: Body | None = None
         """The law that flies; None on the ground"""
         self._memory: Memory = engaged_memory(np.zeros(3))
@@ -196,8 +212,12 @@ class GuidedAutopilot:
         return view, contact, first
 
     def _fly(self, target: Target, estimate: Array, view: VehicleView, contact: Contact) -> None:
+        if isinstance(target, Attitude):
+            self._steer(target)
+            return
         if isinstance(target, Idle | Terminate):
             self._law = None
+            self._steered = False
             self._controls[: len(self._vehicle.rotors)] = IDLE_COMMAND
             return
         body = self._body_for(target, contact)
@@ -207,6 +227,28 @@ class GuidedAutopilot:
             target = self._pull(target, view)
         self._trajectory.advance(target, self._limits(), float(self._memory["ticks"][0]) * self._period)
         self._step()
+
+    def _steer(self, target: Attitude) -> None:
+        """One step of the attitude law."""
+        law, p = self._attitude_law, self.station.parameters
+        if not self._steered:
+            law["integral"] = 0.0
+        self._law, self._steered = None, True
+        set_limits(
+            law,
+            (p["MC_ROLL_P"], p["MC_PITCH_P"], p["MC_YAW_P"]),
+            (
+                math.radians(p["MC_ROLLRATE_MAX"]),
+                math.radians(p["MC_PITCHRATE_MAX"]),
+                math.radians(p["MC_YAWRATE_MAX"]),
+            ),
+        )
+        law["has_attitude"] = target.attitude is not None
+        if target.attitude is not None:
+            law["attitude"] = target.attitude
+        law["rate"] = target.body_rates
+        law["thrust"] = target.thrust / p["MPC_THR_HOVER"] * self._vehicle.hover_thrust
+        self._attitude_step()
 
     def _body_for(self, target: Goto | Follow | Land, contact: Contact) -> Body:
         """Which law is to fly: the load's when the load hangs, and for as long as it is asked for."""
@@ -235,6 +277,9 @@ class GuidedAutopilot:
         self._trajectory.start(estimate[position], estimate[velocity], yaw)
         if before is not None and self._law is not None:
             handover.other_body(self._designs[self._law], self._designs[body], before, memory)
+        if self._steered:
+            handover.from_wrench(self._designs[body], self._work["achieved"][0], memory)
+            self._steered = False
         self._law, self._memory = body, memory
         self._step = self._bound(body)
 

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import math
 
-from controller.ground.flight.setpoint_types import Body, Follow, Goto, Idle, Land, Target, Terminate
+from controller.ground.flight.setpoint_types import (
+    Attitude,
+    Body,
+    Follow,
+    Goto,
+    Idle,
+    Land,
+    Target,
+    Terminate,
+)
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import LocalOrigin, Triple, quaternion_from_euler
 
@@ -38,7 +47,11 @@ def step(view: VehicleView, target: Target, dt: float, profile: Profile = PROFIL
     view.time += dt
     vehicle, load = view.position, view.load_position
     hanging = profile.hover_length
-    if isinstance(target, Idle | Terminate):
+    if isinstance(target, Attitude):
+        new_vehicle, new_load = vehicle, load
+        if target.attitude is not None:
+            view.attitude = target.attitude
+    elif isinstance(target, Idle | Terminate):
         new_vehicle, new_load = (vehicle[0], vehicle[1], LEGS), (load[0], load[1], RADIUS)
     elif target.body is Body.LOAD:
         new_load = _moved(load, target, dt)

@@ -7,7 +7,6 @@ import math
 from typing import Any
 
 import pytest
-from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.setpoint_types import Follow, Idle
 from controller.ground.flight.trajectory import stopping_distance
@@ -110,7 +109,6 @@ def test_a_set_point_of_the_load_is_the_loads() -> None:
         (local_setpoint(math.inf, 0, -5), "beyond all bounds"),
         (local_setpoint(0, 0, -5, frame=9), "body's frame|frame 9"),
         (local_setpoint(9000, 0, -5), "GF_MAX_HOR_DIST"),
-        (mavlink.MAVLink_set_attitude_target_message(0, 1, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5), "Attitude"),
     ],
 )
 def test_set_points_that_cannot_be_flown_are_refused_and_do_not_count(message: Any, words: str) -> None:

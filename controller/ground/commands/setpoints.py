@@ -1,4 +1,4 @@
-"""Offboard set-points: from SET_POSITION_TARGET_* to one value in the world's frame, masks respected."""
+"""Offboard set-points: from SET_POSITION_TARGET_* or SET_ATTITUDE_TARGET to one value, masks respected."""
 
 from __future__ import annotations
 
@@ -7,18 +7,23 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.flight.setpoint_types import Attitude
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import (
     DEG_E7_PER_DEG,
     Geodetic,
     Triple,
+    attitude_to_ned_frd,
     enu_to_ned,
     euler_from_quaternion,
+    flu_to_frd,
     yaw_from_heading,
 )
 
 NOTHING: Triple = (math.nan, math.nan, math.nan)
 _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
+_LARGEST_RATE = 100.0
+"""rad/s"""
 _FORCE, _NO_YAW, _NO_YAW_RATE = 1 << 9, 1 << 10, 1 << 11
 _BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_FRD)
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
@@ -70,6 +75,30 @@ def setpoint_of(
     return Setpoint(of_load, found, velocity, acceleration, yaw, -turn)
 
 
+_NO_THRUST, _NO_ATTITUDE = 1 << 6, 1 << 7
+
+
+def attitude_setpoint_of(message: Any) -> Attitude | str:
+    """The set-point of SET_ATTITUDE_TARGET, or why it cannot be flown."""
+    mask = message.type_mask
+    if mask & _NO_THRUST or not math.isfinite(message.thrust):
+        return "Set-point denied: attitude without thrust; unmask it"
+    asked = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
+    if any(math.isinf(rate) or abs(rate) > _LARGEST_RATE for rate in asked):
+        return "Set-point denied: a body rate is beyond all bounds"
+    rates = flu_to_frd(_unmasked(asked, mask, 0))
+    thrust = min(max(message.thrust, 0.0), 1.0)
+    if mask & _NO_ATTITUDE:
+        if all(math.isnan(rate) for rate in rates):
+            return "Set-point denied: neither attitude nor body rates; unmask one"
+        return Attitude(None, rates, thrust)
+    w, x, y, z = message.q
+    size = math.sqrt(w * w + x * x + y * y + z * z)
+    if not 0.5 < size < 2.0:
+        return "Set-point denied: q is no attitude; send a unit quaternion"
+    return Attitude(attitude_to_ned_frd((w / size, x / size, y / size, z / size)), rates, thrust)
+
+
 def _unmasked(values: Triple, mask: int, shift: int) -> Triple:
     x, y, z = (math.nan if mask >> shift + i & 1 else value for i, value in enumerate(values))
     return (x, y, z)
@@ -113,11 +142,11 @@ class Offboard:
     """The set-point that counts, and whose it is: one sender at a time, until it falls silent."""
 
     def __init__(self) -> None:
-        self.latest: Setpoint | None = None
+        self.latest: Setpoint | Attitude | None = None
         self._time = -math.inf
         self._sender: object = None
 
-    def offer(self, setpoint: Setpoint, sender: object, now: float, timeout: float) -> str:
+    def offer(self, setpoint: Setpoint | Attitude, sender: object, now: float, timeout: float) -> str:
         """Take a set-point; returns why not, or an empty string."""
         if self.fresh(now, timeout) and sender != self._sender:
             return "Another client has offboard control; stop its set-points first"

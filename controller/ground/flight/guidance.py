@@ -29,7 +29,7 @@ from controller.ground.flight.geometry import (
 from controller.ground.flight.mission_flight import MissionFlight, Then
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.return_home import ReturnHome
-from controller.ground.flight.setpoint_types import Body, Follow, Goto, Idle, Target
+from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
 from controller.ground.missions import mission_plan as plan
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
@@ -37,6 +37,8 @@ from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
 _AT_FLOOR = 0.01
 """m, by which a set-point's height may be below the floor without a word"""
+_LIFTING = 0.5
+"""Share of the hover thrust below which a vehicle on the ground stays there"""
 _STAY_AT_FLOOR = 0.3
 """m above the room that a stop needs, within which a body that stops at the floor goes on to"""
 
@@ -213,9 +215,14 @@ class Guidance:
         fence = self.fence(view is None or view.load_attached)
         return max(self._asked_height(altitude), fence.home[2] + fence.least_height)
 
+    def lifts(self, setpoint: Setpoint | Attitude | None) -> bool:
+        """Whether a client that steers the attitude gives a thrust that is meant to fly."""
+        hover = self._parameters["MPC_THR_HOVER"]
+        return isinstance(setpoint, Attitude) and setpoint.thrust > _LIFTING * hover
+
     # Where to go now
 
-    def target(self, view: VehicleView, setpoint: Setpoint | None, last: Target) -> Target:
+    def target(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:
         """Off the ground: what to do now. `setpoint`: the offboard client's; `last`: the target before."""
         if self._point_of is Body.LOAD and not view.load_attached:
             self._go_on_without_load()
@@ -266,7 +273,7 @@ class Guidance:
             return Idle(True)
         return target
 
-    def _fly(self, view: VehicleView, setpoint: Setpoint | None, last: Target) -> Target:
+    def _fly(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:
         mode = self._pilot.mode
         if mode is Mode.LAND:
             self._land(view, stopping_point(view, self._parameters))
@@ -275,9 +282,15 @@ class Guidance:
             return self._return_home(view)
         if mode is Mode.MISSION:
             return self._fly_mission(view)
-        if mode is Mode.OFFBOARD and setpoint is not None:
-            return self._follow(setpoint, view)
-        return self._hold(view)
+        if mode is not Mode.OFFBOARD or setpoint is None:
+            return self._hold(view)
+        if isinstance(setpoint, Attitude):
+            if view.vehicle_on_ground and not self.lifts(setpoint):
+                self.stage = Stage.GROUND
+                self.landed_at = view.time
+                return Idle(True)
+            return setpoint
+        return self._follow(setpoint, view)
 
     def _hold(self, view: VehicleView) -> Goto:
         speed = limited_speed(self.speed, self._parameters)

@@ -18,7 +18,7 @@ from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.preconditions import arming_faults
 from controller.ground.flight.px4_modes import Mode
-from controller.ground.flight.setpoint_types import Idle, Target, Terminate
+from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.mission_plan import Fault, Item
 from controller.ground.parameters.protocol import Parameters
@@ -231,6 +231,10 @@ class Machine:
             return f"Set-point denied: {fault}"
         return self.offboard.offer(setpoint, sender, now, self.parameters["COM_OF_LOSS_T"])
 
+    def offer_attitude(self, setpoint: Attitude, sender: object, now: float) -> str:
+        """An offboard set-point of attitude or rates; returns why it is not taken, or an empty string."""
+        return self.offboard.offer(setpoint, sender, now, self.parameters["COM_OF_LOSS_T"])
+
     def check_plan(self, items: tuple[Item, ...]) -> Fault | None:
         """The first fault of a plan."""
         return plan.check(items, self.profile, self.home_geodetic(), self._guidance.fence())
@@ -301,6 +305,10 @@ class Machine:
         ):
             self._guidance.take_off(view)
             return
+        steered = self.mode is Mode.OFFBOARD and self._setpoint_fresh(now)
+        if steered and self._guidance.lifts(self.offboard.latest):
+            self._guidance.stage = Stage.FLYING
+            return
         landed = self._guidance.landed_at >= self._armed_at_view
         name = "COM_DISARM_LAND" if landed else "COM_DISARM_PRFLT"
         since = self._guidance.landed_at if landed else self._armed_at_view
@@ -340,7 +348,7 @@ class Machine:
     def _setpoint_lifts(self, view: VehicleView) -> bool:
         """Whether the offboard client wants the vehicle off the ground, by the axes that PX4 looks at."""
         asked = self.offboard.latest
-        if asked is None:
+        if asked is None or isinstance(asked, Attitude):
             return False
         height = self._vehicle_point(asked.position, asked.of_load)[2]
         return height > view.position[2] + _LIFTS or asked.velocity[2] > 0.0 or asked.acceleration[2] > 0.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from sitl_bridge.frames import Triple
+from sitl_bridge.frames import Quaternion, Triple
 
 
 class Body(Enum):
@@ -62,6 +62,18 @@ class Follow:
 
 
 @dataclass(frozen=True, slots=True)
+class Attitude:
+    """Fly an attitude or body rates with a thrust, as somebody else steers: no position is controlled."""
+
+    attitude: Quaternion | None
+    """FLU to ENU; None: the rates alone count"""
+    body_rates: Triple
+    """rad/s, FLU; beside an attitude a feed-forward; NaN: none, or as it is"""
+    thrust: float
+    """0..1; MPC_THR_HOVER carries vehicle and load"""
+
+
+@dataclass(frozen=True, slots=True)
 class Land:
     """Sink above a point until the machine sees contact: the height has no lower end."""
 
@@ -79,4 +91,4 @@ class Terminate:
     """Rotors stopped, wherever the vehicle is."""
 
 
-Target = Idle | Goto | Follow | Land | Terminate
+Target = Idle | Goto | Follow | Attitude | Land | Terminate

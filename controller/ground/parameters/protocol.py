@@ -198,7 +198,7 @@ class Parameters:
 
 def _inside(p: Parameter, value: float) -> bool:
     """Within the range, whose ends count although they are no float32 numbers."""
-    return bool(_single(p.minimum) <= value <= _single(p.maximum))
+    return bool(single(p.minimum) <= value <= single(p.maximum))
 
 
 def _number(value: object) -> float | None:
@@ -211,18 +211,19 @@ def _number(value: object) -> float | None:
         return math.inf if value > 0 else -math.inf
 
 
-def _single(value: float) -> float:
+def single(value: float) -> float:
+    """A number as a float32 keeps it."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 def _float32(p: Parameter) -> float:
-    return p.default if p.is_integer else _single(p.default)
+    return p.default if p.is_integer else single(p.default)
 
 
 def _in_float32(name: str, value: float) -> float:
     p = BY_NAME.get(name)
     keep = p is None or p.is_integer or not math.isfinite(value) or abs(value) > 1e30
-    return value if keep else _single(value)
+    return value if keep else single(value)
 
 
 def _kind(p: Parameter) -> int:

@@ -62,6 +62,14 @@ _USED: tuple[Parameter, ...] = (
     Parameter("NAV_ACC_RAD", 1.0, 0.05, 200.0, "m", "Radius in which vehicle and load have to be for a way-point to count as reached"),
     Parameter("LND_CLEARANCE", 0.5, 0.1, 20.0, "m", "Least height of the hanging load above home's ground; lower set-points are raised to it"),
     Parameter("LND_BESIDE", 0.8, 0.2, 20.0, "m", "Distance from the load at which the vehicle lands; at most 0.6 of the cable"),
+    # Attitude set-points (SET_ATTITUDE_TARGET)
+    Parameter("MPC_THR_HOVER", 0.5, 0.1, 0.8, "", "Thrust of a set-point that carries vehicle and load; by default the vehicle's own, with 1 all that its rotors can give"),
+    Parameter("MC_ROLL_P", 6.5, 0.0, 12.0, "1/s", "Roll rate per error of the roll; at most what the rotors' lag bears"),
+    Parameter("MC_PITCH_P", 6.5, 0.0, 12.0, "1/s", "Pitch rate per error of the pitch; at most what the rotors' lag bears"),
+    Parameter("MC_YAW_P", 2.8, 0.0, 5.0, "1/s", "Yaw rate per error of the heading; at most what the rotors' lag bears"),
+    Parameter("MC_ROLLRATE_MAX", 220.0, 0.0, 1800.0, "deg/s", "Largest roll rate that an attitude may ask for"),
+    Parameter("MC_PITCHRATE_MAX", 220.0, 0.0, 1800.0, "deg/s", "Largest pitch rate that an attitude may ask for"),
+    Parameter("MC_YAWRATE_MAX", 200.0, 0.0, 1800.0, "deg/s", "Largest yaw rate that an attitude may ask for"),
     # Return
     Parameter("RTL_RETURN_ALT", 6.0, 1.0, 150.0, "m", "Height above home on the way back"),
     Parameter("RTL_MIN_DIST", 3.0, 0.0, 100.0, "m", "Nearer to home than this, the vehicle does not climb to RTL_RETURN_ALT first"),

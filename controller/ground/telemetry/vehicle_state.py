@@ -29,6 +29,8 @@ class Profile:
     """m ENU, of the ground's surface"""
     battery_cells: int | None = None
     """In series; None: there is no battery."""
+    hover_thrust: float = 0.5
+    """That carries vehicle and load, as a share of what the rotors can give"""
 
     @property
     def system(self) -> int:
@@ -54,6 +56,7 @@ def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> 
         has_ground,
         0.0 if vehicle.ground is None else vehicle.ground.height,
         None if vehicle.battery is None else vehicle.battery.cells,
+        vehicle.hover_thrust / sum(r.thrust_coefficient * r.max_speed**2 for r in vehicle.rotors),
     )
 
 
