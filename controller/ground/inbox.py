@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -18,6 +19,7 @@ from controller.ground.missions import transfer as mission_protocol
 from controller.ground.missions.transfer import Client, Missions
 from controller.ground.parameters.protocol import HASH_CHECK, Parameters
 from controller.ground.telemetry import messages as telemetry
+from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
 
@@ -161,6 +163,16 @@ class Inbox:
         if fault:
             self._out.say_seldom(peer, fault, now)
 
+    def _follow_target(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        numbers = (message.alt, *message.vel)
+        degrees = (message.lat / DEG_E7_PER_DEG, message.lon / DEG_E7_PER_DEG)
+        # est_capabilities: bit 0 is the position, bit 1 the velocity; some clients leave both out.
+        if not all(math.isfinite(n) and abs(n) < 1e6 for n in numbers) or abs(degrees[0]) > 90.0:
+            self._out.say_seldom(peer, "Target denied: its position or velocity is no number", now)
+            return
+        position = self._profile.origin.local(Geodetic(*degrees, message.alt))
+        self._machine.hear_target(position, enu_to_ned(tuple(message.vel)))
+
     def _data_stream(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if self._addressed(message):
             on = message.start_stop == 1
@@ -204,6 +216,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: Inbox._setpoint,
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: Inbox._setpoint,
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: Inbox._attitude_setpoint,
+    mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET: Inbox._follow_target,
     mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
     mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,

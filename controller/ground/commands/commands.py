@@ -10,12 +10,16 @@ from typing import Any, NamedTuple, Protocol
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import OK, UNSUPPORTED, Verdict, deny, not_now
+from controller.ground.flight.geometry import filled
 from controller.ground.flight.modes import Machine, Reposition
+from controller.ground.flight.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
 from controller.ground.flight.px4_modes import Mode, find_mode, find_standard_mode
-from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, yaw_from_heading
+from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple, yaw_from_heading
 
 FORCE = 21196.0
 """param2 of an arm or disarm command that is meant in any case"""
+DEFAULT_RADIUS = 10.0
+"""m, of an orbit or figure of eight that says none"""
 MEMORY = 5.0
 """s, in which the same command with a greater confirmation is taken for a retransmission"""
 DOUBLED = 0.2
@@ -50,6 +54,8 @@ _WITH_PLACE = frozenset(
         mavlink.MAV_CMD_NAV_TAKEOFF,
         mavlink.MAV_CMD_NAV_LAND,
         mavlink.MAV_CMD_DO_REPOSITION,
+        mavlink.MAV_CMD_DO_ORBIT,
+        mavlink.MAV_CMD_DO_FIGURE_EIGHT,
         mavlink.MAV_CMD_DO_SET_HOME,
         mavlink.MAV_CMD_NAV_LOITER_UNLIM,
         mavlink.MAV_CMD_NAV_WAYPOINT,
@@ -211,6 +217,58 @@ def _reposition(c: Command, machine: Machine, requests: Requests, now: float) ->
     return machine.reposition(where, c.p2 == 1.0)
 
 
+def _orbit(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    centre = _centre(c, machine, "Orbit")
+    if isinstance(centre, Verdict):
+        return centre
+    if math.isinf(c.p1) or math.isinf(c.p2) or math.isinf(c.p4):
+        return deny("Orbit denied: radius, speed or turns are infinite")
+    radius = _or(c.p1, DEFAULT_RADIUS)
+    speed = _or(c.p2, machine.parameters["MPC_XY_CRUISE"])
+    kind = 0.0 if math.isnan(c.p3) else c.p3
+    if kind not in tuple(Yaw) or radius == 0.0 or speed == 0.0:
+        return deny(f"Orbit denied: radius {radius:g} m, speed {speed:g} m/s, heading {kind:g}; see DO_ORBIT")
+    most = machine.parameters["MPC_XY_VEL_MAX"]
+    orbit = Orbit(centre, radius, math.copysign(min(abs(speed), most), speed), Yaw(int(kind)), _or(c.p4, 0.0))
+    verdict = machine.fly_pattern(orbit)
+    if verdict.ok and orbit.speed < abs(speed) - 0.01:
+        requests.say(f"Orbit limited to {orbit.speed:.1f} m/s")
+    return verdict
+
+
+def _figure_eight(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    centre = _centre(c, machine, "Figure eight")
+    if isinstance(centre, Verdict):
+        return centre
+    if any(math.isinf(p) for p in (c.p1, c.p2, c.p4)):
+        return deny("Figure eight denied: a radius or the orientation is infinite")
+    major = _or(c.p1, DEFAULT_RADIUS)
+    minor = _or(c.p2, 0.5 * abs(major))
+    if not 1.0 <= abs(major) <= LARGEST_RADIUS or not 0.5 <= abs(minor) <= abs(major):
+        return deny(f"Figure eight denied: radii {major:g} m and {minor:g} m; from 1 m, the longer first")
+    speed = machine.parameters["MPC_XY_CRUISE"]
+    return machine.fly_pattern(FigureEight(centre, major, minor, yaw_from_heading(_or(c.p4, 0.0)), speed))
+
+
+def _centre(c: Command, machine: Machine, name: str) -> Triple | Verdict:
+    """Of a pattern, m ENU of the vehicle; what is NaN is where the vehicle is."""
+    if c.frame_fault and not math.isnan(c.p7):
+        return deny(f"{name} denied: {c.frame_fault}")
+    if math.isnan(c.p5) != math.isnan(c.p6):
+        return deny(f"{name} denied: latitude without longitude; send both or neither")
+    if abs(c.p5) > 90 or abs(c.p6) > 180 or math.isinf(c.p7):
+        return deny(f"{name} denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is no place; use degrees")
+    if machine.view is None:
+        return not_now(f"{name} denied: no position yet; start the plant")
+    home = machine.profile.origin.home
+    east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, home.altitude))
+    return filled((east, north, _height(c, machine)), machine.view.position)
+
+
+def _or(value: float, default: float) -> float:
+    return default if math.isnan(value) else value
+
+
 def _pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 == 0.0:
         return machine.set_mode(Mode.HOLD, now)
@@ -315,6 +373,8 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_DO_SET_MODE: _set_mode,
     mavlink.MAV_CMD_DO_SET_STANDARD_MODE: _set_standard_mode,
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
+    mavlink.MAV_CMD_DO_ORBIT: _orbit,
+    mavlink.MAV_CMD_DO_FIGURE_EIGHT: _figure_eight,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_MISSION_START: _mission_start,

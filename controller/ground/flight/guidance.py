@@ -16,6 +16,7 @@ from controller.ground.flight.ascent import Ascent, Step
 from controller.ground.flight.descent import Descent
 from controller.ground.flight.descent import Step as DescentStep
 from controller.ground.flight.fence import Fence, fence_around
+from controller.ground.flight.follow_target import FollowTarget
 from controller.ground.flight.geometry import (
     above,
     below,
@@ -27,6 +28,7 @@ from controller.ground.flight.geometry import (
     too_deep,
 )
 from controller.ground.flight.mission_flight import MissionFlight, Then
+from controller.ground.flight.patterns import Orbit, Pattern, Yaw
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.return_home import ReturnHome
 from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
@@ -90,12 +92,17 @@ class Guidance:
         self._ascent: Ascent | None = None
         self._descent: Descent | None = None
         self._return: ReturnHome | None = None
+        self._silent = False
+        """Nobody says where he is to be followed to, and that was said"""
         self._point: Triple = (0.0, 0.0, 0.0)
         """m, of `_point_of` in HOLD and while waiting"""
         self._point_of = Body.LOAD
         self._yaw = 0.0
         self._at_floor = False
         """The offboard client asks for less height than there may be, and has been told"""
+        self.pattern: Pattern | None = None
+        """An orbit in ORBIT, a figure of eight in HOLD"""
+        self.followed = FollowTarget()
         self._destination: tuple[Triple, float, float] | None = None
         """Of a reposition that waits for the end of a take-off: vehicle (m), yaw (rad), speed (m/s)"""
 
@@ -134,7 +141,7 @@ class Guidance:
     def end(self) -> None:
         """Disarmed."""
         self.stage = Stage.GROUND
-        self._ascent = self._descent = self._return = self._destination = None
+        self._ascent = self._descent = self._return = self._destination = self.pattern = None
         self.takeoff_height = math.nan
 
     # What is asked of it
@@ -166,8 +173,8 @@ class Guidance:
         self.speed = speed
 
     def forget_destination(self) -> None:
-        """Something else is asked for than the point that waits for the end of the take-off."""
-        self._destination = None
+        """Something else is asked for than the point that waits for the take-off's end, or the pattern."""
+        self._destination = self.pattern = None
 
     def ask_takeoff_height(self, altitude: float, view: VehicleView) -> None:
         """Height (vehicle, m ENU) of the take-off to come or under way; NaN: the default, or as it is."""
@@ -189,6 +196,8 @@ class Guidance:
         self._at_floor = False
         if mode is Mode.MISSION:
             self._mission.start()
+        elif mode is Mode.FOLLOW_TARGET:
+            self.followed.start()
 
     def take_off(self, view: VehicleView) -> None:
         """Leave the ground, to the height that was asked for or that the mission begins with."""
@@ -282,6 +291,10 @@ class Guidance:
             return self._return_home(view)
         if mode is Mode.MISSION:
             return self._fly_mission(view)
+        if mode is Mode.FOLLOW_TARGET:
+            return self._follow_target(view)
+        if self.pattern is not None or mode is Mode.ORBIT:
+            return self._fly_pattern(view)
         if mode is not Mode.OFFBOARD or setpoint is None:
             return self._hold(view)
         if isinstance(setpoint, Attitude):
@@ -295,6 +308,27 @@ class Guidance:
     def _hold(self, view: VehicleView) -> Goto:
         speed = limited_speed(self.speed, self._parameters)
         return Goto(self._point_of, self._point, self._yaw, speed)
+
+    def _follow_target(self, view: VehicleView) -> Target:
+        asked = self.followed.setpoint(view, self.home_or_origin, self._parameters)
+        self._silent = self._said_once(
+            self._silent, self.followed.silent(view), "Nobody to follow: no FOLLOW_TARGET; waiting"
+        )
+        return self._hold(view) if asked is None else self._follow(asked, view)
+
+    def _fly_pattern(self, view: VehicleView) -> Target:
+        if self.pattern is None:  # the mode was asked for without an orbit: as PX4, round where it is
+            self.pattern = Orbit(view.position, 1.0, 1.0, Yaw.TO_CENTRE, 0.0)
+        target = self._follow(self.pattern.setpoint(view, self._profile), view)
+        if isinstance(self.pattern, Orbit) and self.pattern.over:
+            self._pilot.say(INFO, "Orbit finished; holding")
+            self._pilot.enter(Mode.HOLD)
+        return target
+
+    def _said_once(self, before: bool, now: bool, text: str) -> bool:
+        if now and not before:
+            self._pilot.say(WARNING, text)
+        return now
 
     def _stay_at(self, point: Triple, body: Body) -> None:
         self._point, self._point_of = point, body

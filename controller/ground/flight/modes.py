@@ -16,6 +16,7 @@ from controller.ground.flight.fence import Fence
 from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
 from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
+from controller.ground.flight.patterns import Orbit, Pattern
 from controller.ground.flight.preconditions import arming_faults
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
@@ -79,6 +80,11 @@ class Machine:
     def flying(self) -> bool:
         """Whether the vehicle is off the ground, or on its way."""
         return self.armed and self.stage is not Stage.GROUND
+
+    @property
+    def _flies_soon(self) -> bool:
+        """Whether the vehicle is off the ground, or will be at the next look."""
+        return self.flying or (self.armed and self.mode is Mode.TAKEOFF)
 
     @property
     def fence(self) -> Fence | None:
@@ -183,7 +189,7 @@ class Machine:
         view = self.view
         if self.terminated:
             return deny("Reposition denied: the flight was terminated; disarm first")
-        if view is None or not (self.flying or (self.armed and self.mode is Mode.TAKEOFF)):
+        if view is None or not self._flies_soon:
             return not_now("Reposition denied: not flying; take off first")
         if not change_mode and self.mode is not Mode.HOLD:
             return not_now(f"Reposition denied: in {self.mode.title}; ask for a change of mode (param2 = 1)")
@@ -207,6 +213,36 @@ class Machine:
         if self.stage is not Stage.FLYING and not stays:
             self.say(INFO, "Reposition accepted: after take-off")
         return OK
+
+    def fly_pattern(self, pattern: Pattern) -> Verdict:
+        """Fly an orbit, or a figure of eight in Hold, when the load hangs clear of the ground."""
+        name = "Orbit" if isinstance(pattern, Orbit) else "Figure eight"
+        fence = self.fence
+        if self.terminated:
+            return deny(f"{name} denied: the flight was terminated; disarm first")
+        if fence is None or self.view is None or not self._flies_soon:
+            return not_now(f"{name} denied: not flying; take off first")
+        for point in pattern.extent():
+            if fault := fence.outside(point):
+                return deny(f"{name} denied: {fault}")
+        if fault := fence.too_low(pattern.centre):
+            self.say(WARNING, f"{name} limited: {fault}")
+            pattern.centre = fence.raised(pattern.centre)
+        if self.stage is Stage.GROUND:
+            self._guidance.take_off(self.view)
+        self.enter(Mode.ORBIT if isinstance(pattern, Orbit) else Mode.HOLD)
+        self._guidance.pattern = pattern
+        return OK
+
+    @property
+    def pattern(self) -> Pattern | None:
+        """The orbit or figure of eight that is flown, or will be after the take-off."""
+        return self._guidance.pattern
+
+    def hear_target(self, position: Triple, velocity: Triple) -> None:
+        """Where somebody is who may be followed, m and m/s ENU."""
+        if self.view is not None:
+            self._guidance.followed.hear(position, velocity, self.view.time)
 
     def change_speed(self, speed: float) -> Verdict:
         """Largest horizontal speed until the mode changes, m/s; -1: the default."""

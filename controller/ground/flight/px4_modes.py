@@ -5,7 +5,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-_MAIN_AUTO = 4
+_MAIN_POSITION, _MAIN_AUTO = 3, 4
+_WITH_SUB_MODES = (_MAIN_POSITION, _MAIN_AUTO)
 _PROPERTY_ADVANCED = 1
 _PROPERTY_NOT_USER_SELECTABLE = 2
 
@@ -27,6 +28,8 @@ class Mode(Enum):
     MISSION = _Numbers(_MAIN_AUTO, 4, 6, 0)
     RTL = _Numbers(_MAIN_AUTO, 5, 5, 0)
     LAND = _Numbers(_MAIN_AUTO, 6, 7, 0)
+    FOLLOW_TARGET = _Numbers(_MAIN_AUTO, 8, 0, 0)
+    ORBIT = _Numbers(_MAIN_POSITION, 1, 2, 0)
     OFFBOARD = _Numbers(6, 0, 0, _PROPERTY_ADVANCED)
     TERMINATION = _Numbers(10, 0, 0, _PROPERTY_NOT_USER_SELECTABLE)
 
@@ -48,7 +51,7 @@ class Mode(Enum):
     @property
     def title(self) -> str:
         """The mode's name for a person."""
-        return {"RTL": "Return"}.get(self.name, self.name.capitalize())
+        return {"RTL": "Return", "FOLLOW_TARGET": "Follow Me"}.get(self.name, self.name.capitalize())
 
 
 SELECTABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
@@ -70,13 +73,11 @@ def find_mode(main: float, sub: float) -> Mode | str:
     """The mode of PX4's numbers, or why there is none."""
     if main != int(main) or sub != int(sub):
         return f"Mode {main:g}/{sub:g} does not exist; {_FITTING}"
-    found = _BY_NUMBER.get((int(main), int(sub) if main == _MAIN_AUTO else 0))
+    found = _BY_NUMBER.get((int(main), int(sub) if main in _WITH_SUB_MODES else 0))
     if found is not None:
         return found
     if int(main) in _ELSEWHERE:
         return f"{_ELSEWHERE[int(main)]} mode needs a remote control, there is none; {_FITTING}"
-    if (int(main), int(sub)) == (_MAIN_AUTO, 8):
-        return f"Follow mode needs a target to follow, there is none; {_FITTING}"
     if int(main) == Mode.TERMINATION.value.main:
         return "Termination is entered by MAV_CMD_DO_FLIGHTTERMINATION only"
     return f"Mode {int(main)}/{int(sub)} does not exist; {_FITTING}"

@@ -207,6 +207,8 @@ class Trajectory:
         if not math.isnan(target.yaw):
             away = math.remainder(target.yaw - yaw, 2.0 * math.pi)
             rate = math.copysign(_approach(abs(away), BRAKING_SHARE * YAW_ACCELERATION, APPROACH), away)
+            if isinstance(target, Follow) and not math.isnan(target.yaw_rate):
+                rate += target.yaw_rate
         elif isinstance(target, Follow) and not math.isnan(target.yaw_rate):
             rate = target.yaw_rate
         rate = max(-YAW_RATE, min(YAW_RATE, rate))

@@ -1,4 +1,4 @@
-"""Messages to bytes, MAVLink 2 or 1, and the two messages that pymavlink's `common` does not have yet."""
+"""Messages to bytes, MAVLink 2 or 1, and the messages that pymavlink's `common` does not have yet."""
 
 from __future__ import annotations
 
@@ -50,6 +50,31 @@ class CurrentMode(mavlink.MAVLink_message):  # type: ignore[misc]
     def __init__(self, standard: int, custom: int, intended: int) -> None:
         super().__init__(self.id, "CURRENT_MODE")
         self._fields = (custom, intended, standard)
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
+
+
+class FigureEightStatus(mavlink.MAVLink_message):  # type: ignore[misc]
+    """FIGURE_EIGHT_EXECUTION_STATUS (361) of the current `common` dialect."""
+
+    id = 361
+    crc_extra = 93
+    _layout = struct.Struct("<QfffiifB")
+
+    def __init__(
+        self,
+        time_usec: int,
+        major: float,
+        minor: float,
+        orientation: float,
+        frame: int,
+        place: tuple[int, int, float],
+    ) -> None:
+        """Radii in m, orientation in rad from north, place as the frame says."""
+        super().__init__(self.id, "FIGURE_EIGHT_EXECUTION_STATUS")
+        self._fields = (time_usec, major, minor, orientation, *place, frame)
 
     def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
         """As pymavlink's generated messages do."""

@@ -99,11 +99,6 @@ _ROWS: tuple[tuple[str, float, float, float, str, str], ...] = (
     ("PLD_BTOUT", 5.0, 0.0, 50.0, "s", "Time-out of precision landing"),
     ("PLD_HACC_RAD", 0.2, 0.0, 10.0, "m", "Accepted error of precision landing"),
     ("WV_EN", 0, 0, 1, "", "Weather-vane"),
-    ("FLW_TGT_HT", 8.0, 8.0, 1000.0, "m", "Height above a target that is followed"),
-    ("FLW_TGT_DST", 8.0, 1.0, 100.0, "m", "Distance from a target that is followed"),
-    ("FLW_TGT_FA", 180.0, -180.0, 180.0, "deg", "Side of a target on which it is followed"),
-    ("FLW_TGT_ALT_M", 0, 0, 2, "", "How the height above a target counts"),
-    ("FLW_TGT_MAX_VEL", 5.0, 0.0, 20.0, "m/s", "Largest speed around a target"),
     ("FLW_TGT_RS", 0.1, 0.0, 1.0, "", "Responsiveness to a target's movement"),
     ("FLW_TGT_FS", 0, 0, 3, "", "Side of a target on which it is followed (PX4 before 1.14)"),
     # Control of a multicopter

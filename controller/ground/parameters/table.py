@@ -70,6 +70,12 @@ _USED: tuple[Parameter, ...] = (
     Parameter("MC_ROLLRATE_MAX", 220.0, 0.0, 1800.0, "deg/s", "Largest roll rate that an attitude may ask for"),
     Parameter("MC_PITCHRATE_MAX", 220.0, 0.0, 1800.0, "deg/s", "Largest pitch rate that an attitude may ask for"),
     Parameter("MC_YAWRATE_MAX", 200.0, 0.0, 1800.0, "deg/s", "Largest yaw rate that an attitude may ask for"),
+    # Follow Me
+    Parameter("FLW_TGT_HT", 8.0, 8.0, 1000.0, "m", "Height of the vehicle above home, or above the target (FLW_TGT_ALT_M)"),
+    Parameter("FLW_TGT_DST", 8.0, 1.0, 100.0, "m", "Horizontal distance from the target"),
+    Parameter("FLW_TGT_FA", 180.0, -180.0, 180.0, "deg", "Side of the target, clockwise from its front: 180 is behind it"),
+    Parameter("FLW_TGT_ALT_M", 0, 0, 2, "", "What FLW_TGT_HT counts from", ((0, "home"), (1, "home (no terrain is known)"), (2, "the target"))),
+    Parameter("FLW_TGT_MAX_VEL", 5.0, 0.0, 20.0, "m/s", "Largest speed around the target, when it turns"),
     # Return
     Parameter("RTL_RETURN_ALT", 6.0, 1.0, 150.0, "m", "Height above home on the way back"),
     Parameter("RTL_MIN_DIST", 3.0, 0.0, 100.0, "m", "Nearer to home than this, the vehicle does not climb to RTL_RETURN_ALT first"),

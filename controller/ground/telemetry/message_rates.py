@@ -7,7 +7,7 @@ import math
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import OK, Verdict, deny
-from controller.ground.link.packing import CurrentMode
+from controller.ground.link.packing import CurrentMode, FigureEightStatus
 
 FASTEST = 250.0
 """Hz, of any message"""
@@ -33,6 +33,8 @@ DEFAULT_RATES: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 1.0,
     CurrentMode.id: 0.5,
+    mavlink.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 2.0,
+    FigureEightStatus.id: 2.0,
     mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE: 1.0,
 }
 """Hz, of each message that is sent unasked. PX4's 50 Hz makes clients on a busy machine drop some."""

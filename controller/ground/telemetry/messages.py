@@ -11,10 +11,11 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.commands.setpoints import NOTHING
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
+from controller.ground.flight.patterns import FigureEight, Orbit
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
 from controller.ground.link.heartbeat import heartbeat
-from controller.ground.link.packing import AvailableModes, CurrentMode
+from controller.ground.link.packing import AvailableModes, CurrentMode, FigureEightStatus
 from controller.ground.telemetry.vehicle_state import VehicleView
 from sitl_bridge.frames import (
     CENTIAMPERES_PER_AMPERE,
@@ -368,7 +369,36 @@ def _estimator_status(machine: Machine, view: VehicleView) -> Any:
     return mavlink.MAVLink_estimator_status_message(_microseconds(view), flags, *ratios, *accuracy)
 
 
+def _orbit_status(machine: Machine, view: VehicleView) -> Any:
+    orbit = machine.pattern
+    if not isinstance(orbit, Orbit) or machine.stage is not Stage.FLYING:
+        return None
+    x, y, altitude = _place(machine, orbit.centre)
+    return mavlink.MAVLink_orbit_execution_status_message(
+        _microseconds(view),
+        -orbit.sense * orbit.radius,
+        mavlink.MAV_FRAME_GLOBAL_INT,
+        x,
+        y,
+        altitude / MILLIMETRES_PER_METRE,
+    )
+
+
+def _figure_eight_status(machine: Machine, view: VehicleView) -> Any:
+    figure = machine.pattern
+    if not isinstance(figure, FigureEight) or machine.stage is not Stage.FLYING:
+        return None
+    x, y, altitude = _place(machine, figure.centre)
+    place = (x, y, altitude / MILLIMETRES_PER_METRE)
+    frame, axis = mavlink.MAV_FRAME_GLOBAL_INT, heading_from_yaw(figure.axis)
+    return FigureEightStatus(
+        _microseconds(view), figure.sense * figure.major, figure.minor, axis, frame, place
+    )
+
+
 BUILDERS: dict[int, Builder] = {
+    mavlink.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: _orbit_status,
+    FigureEightStatus.id: _figure_eight_status,
     mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
