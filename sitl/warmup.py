@@ -5,14 +5,12 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import sys
-import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from importlib.abc import InspectLoader
 from types import ModuleType
 
-from sitl_bridge.compiled import compile_missing, missing, request
+from sitl_bridge.compiled import compile_missing, missing
 from sitl_bridge.compiled.marks import declaring_modules
 
 PACKAGES = ("sitl_bridge", "controller")
@@ -22,24 +20,15 @@ _BAR = 20
 
 
 def warm_up() -> None:
-    """Compile what is missing, the plant's and the autopilot's side by side.
+    """Compile what is missing, and tell how far it is on standard error.
 
-    Tells how far it is on standard error. Raises RuntimeError if something cannot be compiled.
+    Raises RuntimeError if something cannot be compiled, after the rest.
     """
     began = time.monotonic()
     wanted = missing(modules())
-    progress = Progress(len(wanted), sys.stderr.isatty())
-    lanes: dict[str, dict[str, str]] = {}  # whoever compiles a package compiles its shared kernels once
-    for module, key in wanted.items():
-        lanes.setdefault(module.partition(".")[0], {})[module] = key
-    with ThreadPoolExecutor(len(lanes) or 1) as pool:
-        try:
-            for lane in [pool.submit(compile_missing, keys, progress.say) for keys in lanes.values()]:
-                lane.result()
-        except KeyboardInterrupt:
-            request.stop()
-            raise
-    progress.end(time.monotonic() - began)
+    progress = Progress(sys.stderr.isatty())
+    compile_missing(wanted, progress.say)
+    progress.end(len(wanted), time.monotonic() - began)
 
 
 def modules() -> list[str]:
@@ -65,23 +54,18 @@ def _mentioning(package: ModuleType, word: str) -> Iterator[str]:
 class Progress:
     """How many modules are compiled: a bar in a terminal, lines elsewhere."""
 
-    def __init__(self, total: int, terminal: bool) -> None:
-        self._total = total
+    def __init__(self, terminal: bool) -> None:
         self._terminal = terminal
-        self._begun = 0
-        self._lock = threading.Lock()
 
     def say(self, number: int, total: int, module: str) -> None:
-        """Tell that another module is about to be compiled. It is counted here, over all packages."""
-        with self._lock:
-            self._begun += 1
-            text = f"compiling {self._begun} of {self._total}: {module}"
-            if self._terminal:
-                done = _BAR * (self._begun - 1) // self._total
-                text = f"\r\x1b[K[{'#' * done}{'.' * (_BAR - done)}] {text}"
-            print(text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
+        """Tell that a module is about to be compiled."""
+        text = f"compiling {number} of {total}: {module}"
+        if self._terminal:
+            done = _BAR * (number - 1) // total
+            text = f"\r\x1b[K[{'#' * done}{'.' * (_BAR - done)}] {text}"
+        print(text, end="" if self._terminal else "\n", file=sys.stderr, flush=True)
 
-    def end(self, seconds: float) -> None:
+    def end(self, total: int, seconds: float) -> None:
         """Tell that all are compiled."""
-        what = f"compiled {self._total} modules in {seconds:.0f} s" if self._total else "nothing to compile"
-        print(f"\r\x1b[K{what}" if self._terminal else what, file=sys.stderr, flush=True)
+        text = f"compiled {total} modules in {seconds:.0f} s" if total else "nothing to compile"
+        print(f"\r\x1b[K{text}" if self._terminal else text, file=sys.stderr, flush=True)

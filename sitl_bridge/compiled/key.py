@@ -22,7 +22,7 @@ import numpy as np
 
 from sitl_bridge.compiled.marks import Declaration, mark_of
 
-_COMPILER = ("builder", "lowering", "optimizing", "linking")
+_COMPILER = ("lowering", "optimizing", "linking")
 _CPU_FIELDS = {
     *("vendor_id", "cpu family", "model", "stepping", "flags"),
     *("CPU implementer", "CPU architecture", "CPU variant", "CPU part", "CPU revision", "Features"),

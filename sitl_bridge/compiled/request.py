@@ -30,15 +30,6 @@ def say(number: int, total: int, module: str) -> None:
     print(f"compiling {number} of {total}: {module}", file=sys.stderr, flush=True)
 
 
-_running: set[subprocess.Popen[str]] = set()
-
-
-def stop() -> None:
-    """End what other threads of this process have compiled; they raise KeyboardInterrupt."""
-    for process in list(_running):
-        process.terminate()
-
-
 class Outcome(NamedTuple):
     """What became of one module: a file of machine code, or the reason why there is none."""
 
@@ -59,18 +50,18 @@ def compile_modules(keys: Mapping[str, str], say: Say) -> dict[str, Outcome]:
     outcomes: dict[str, Outcome] = {}
     with tempfile.TemporaryFile() as complaints, _builder(keys, places + last_resort, complaints) as process:
         assert process.stdout is not None
-        _running.add(process)
+        module, begun = next(iter(keys)), 0
         try:
-            for number, module in enumerate(keys, 1):
-                say(number, len(keys), module)
-                if not (line := process.stdout.readline()):
-                    break
-                outcomes[module] = _outcome(module, keys[module], *json.loads(line))
+            for line in process.stdout:
+                module, *result = json.loads(line)
+                if result:
+                    outcomes[module] = _outcome(module, keys[module], *result)
+                else:
+                    begun += 1
+                    say(begun, len(keys), module)
         except BaseException:
             process.kill()
             raise
-        finally:
-            _running.discard(process)
         if len(outcomes) < len(keys):
             status = process.wait()
             complaints.seek(0)
@@ -82,7 +73,7 @@ def compile_modules(keys: Mapping[str, str], say: Say) -> dict[str, Outcome]:
 
 
 def _builder(keys: Mapping[str, str], places: list[Path], complaints: IO[bytes]) -> subprocess.Popen[str]:
-    """The process that compiles; it writes a line for each module."""
+    """The process that compiles; see `builder` for what it writes."""
     work = json.dumps({"modules": list(keys), "places": [str(place) for place in places]})
     # The same path as here and, with -P, nothing in front of it; NUMBA_… would change what is compiled.
     command = [sys.executable, "-P", "-c", f"from {__package__}.builder import main; main()", work]
