@@ -12,6 +12,7 @@ from controller.ground.commands.result import WARNING, Notice
 from controller.ground.commands.service import CommandService
 from controller.ground.commands.setpoints import attitude_setpoint_of, setpoint_of
 from controller.ground.flight.modes import Machine
+from controller.ground.flight.sticks import axes_of
 from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Peer, Peers
@@ -173,6 +174,15 @@ class Inbox:
         position = self._profile.origin.local(Geodetic(*degrees, message.alt))
         self._machine.hear_target(position, enu_to_ned(tuple(message.vel)))
 
+    def _sticks(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        axes = axes_of(message)
+        if message.target not in (_BROADCAST, self._profile.system) or axes is None:
+            return
+        sender = (peer.address, frame.system, frame.component)
+        fault = self._machine.move_sticks(axes, sender, now)
+        if fault:
+            self._out.say_seldom(peer, fault, now)
+
     def _data_stream(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if self._addressed(message):
             on = message.start_stop == 1
@@ -217,6 +227,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: Inbox._setpoint,
     mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: Inbox._attitude_setpoint,
     mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET: Inbox._follow_target,
+    mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: Inbox._sticks,
     mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
     mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
     mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,

@@ -10,6 +10,8 @@ from typing import NamedTuple
 from controller.ground.commands.result import CRITICAL, EMERGENCY, WARNING
 from controller.ground.flight.fence import Fence
 from controller.ground.flight.preconditions import tilt
+from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.sticks import JOYSTICK
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import VehicleView
 
@@ -31,10 +33,15 @@ class Trigger(NamedTuple):
     reaction: Reaction
     severity: int
     text: str
+    to_sticks: Mode | None = None
+    """The mode to go over to instead, if a pilot has the sticks"""
 
 
 _LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE, 6: Reaction.DISARM}
 _FENCE = {2: Reaction.HOLD, 3: Reaction.RETURN, 4: Reaction.TERMINATE, 5: Reaction.LAND}
+_OFFBOARD_TO_STICKS = {0: Mode.POSITION, 1: Mode.ALTITUDE}
+_EXCEPTIONS = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}
+"""Bits of COM_RCL_EXCEPT"""
 _OFFBOARD = {
     0: Reaction.HOLD,
     1: Reaction.HOLD,
@@ -50,9 +57,11 @@ _OFFBOARD = {
 class Situation(NamedTuple):
     """What the failsafes look at besides the view."""
 
-    offboard: bool
-    """In offboard mode"""
+    mode: Mode
     setpoint_fresh: bool
+    """Of an offboard client"""
+    last_sticks: float
+    """When a pilot's sticks were last heard; -inf: never"""
     last_station: float | None
     """When a ground station was last heard, if ever"""
     armed_at: float
@@ -87,7 +96,8 @@ class Failsafes:
         fast = (
             ("flight", not (view.in_reach and tilt(view) <= math.radians(p["FD_FAIL_TILT"]))),
             ("estimate", not (view.health.attitude and view.health.position)),
-            ("offboard", situation.offboard and not situation.setpoint_fresh),
+            ("sticks", _without_sticks(now, situation, p)),
+            ("offboard", situation.mode is Mode.OFFBOARD and not situation.setpoint_fresh),
         )
         conditions: tuple[tuple[str, bool], ...] = fast
         if now >= self._next_slow:
@@ -137,10 +147,26 @@ def _estimate(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
 
 
 def _offboard(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
-    reaction = _OFFBOARD[p.integer("COM_OBL_RC_ACT")]
-    return Trigger(
-        reaction, WARNING, f"No offboard set-point for {p['COM_OF_LOSS_T']:g} s: {_word(reaction)}"
-    )
+    action = p.integer("COM_OBL_RC_ACT")
+    reaction = _OFFBOARD[action]
+    text = f"No offboard set-point for {p['COM_OF_LOSS_T']:g} s: {_word(reaction)}"
+    return Trigger(reaction, WARNING, text, _OFFBOARD_TO_STICKS.get(action))
+
+
+def _without_sticks(now: float, situation: Situation, p: Parameters) -> bool:
+    """Whether a pilot's sticks are lost where they count: in their own modes, and in others as on PX4."""
+    timeout = p["COM_RC_LOSS_T"]
+    # A pilot who was lost before arming is no loss: this flight was begun without sticks.
+    since = max(situation.armed_at - timeout, -1e300)
+    if now - situation.last_sticks <= timeout or situation.last_sticks < since:
+        return False
+    bit = _EXCEPTIONS.get(situation.mode, 0)
+    return p.integer("COM_RC_IN_MODE") in JOYSTICK and not p.integer("COM_RCL_EXCEPT") & bit
+
+
+def _sticks(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    reaction = _LINK[p.integer("NAV_RCL_ACT")]
+    return Trigger(reaction, WARNING, f"No sticks for {p['COM_RC_LOSS_T']:g} s: {_word(reaction)}")
 
 
 def _station(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
@@ -167,6 +193,7 @@ _REACTIONS: dict[str, _Maker] = {
     "flight": _flight,
     "estimate": _estimate,
     "offboard": _offboard,
+    "sticks": _sticks,
     "station": _station,
     "fence": _geofence,
     "battery low": _battery(WARNING, "low", {}),

@@ -29,7 +29,7 @@ from controller.ground.flight.geometry import (
 )
 from controller.ground.flight.mission_flight import MissionFlight, Then
 from controller.ground.flight.patterns import Orbit, Pattern, Yaw
-from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.return_home import ReturnHome
 from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
 from controller.ground.missions import mission_plan as plan
@@ -232,7 +232,7 @@ class Guidance:
     # Where to go now
 
     def target(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:
-        """Off the ground: what to do now. `setpoint`: the offboard client's; `last`: the target before."""
+        """Off the ground: what to do now. `setpoint`: by client or pilot; `last`: the target before."""
         if self._point_of is Body.LOAD and not view.load_attached:
             self._go_on_without_load()
         if self.stage is Stage.ASCENT and self._ascent is not None:
@@ -295,7 +295,7 @@ class Guidance:
             return self._follow_target(view)
         if self.pattern is not None or mode is Mode.ORBIT:
             return self._fly_pattern(view)
-        if mode is not Mode.OFFBOARD or setpoint is None:
+        if mode not in (Mode.OFFBOARD, *BY_STICKS) or setpoint is None:
             return self._hold(view)
         if isinstance(setpoint, Attitude):
             if view.vehicle_on_ground and not self.lifts(setpoint):

@@ -18,8 +18,9 @@ from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.patterns import Orbit, Pattern
 from controller.ground.flight.preconditions import arming_faults
-from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
+from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.mission_plan import Fault, Item
 from controller.ground.parameters.protocol import Parameters
@@ -54,6 +55,7 @@ class Machine:
         self.terminated = False
         self.mode = Mode.HOLD
         self.offboard = Offboard()
+        self.sticks = Sticks()
         self.mission = MissionFlight()
         self.failsafes = Failsafes()
         self.target: Target = Idle(False)
@@ -153,6 +155,8 @@ class Machine:
             return deny(f"Mission denied: {fault.text}")
         if mode is Mode.OFFBOARD and not self._setpoint_fresh(now):
             return not_now("Offboard denied: no set-points; send them at 2 Hz or more first")
+        if mode in BY_STICKS and not self._sticks_fresh(now):
+            return not_now(f"{mode.title} denied: no sticks; send MANUAL_CONTROL first")
         if mode is Mode.LAND and not self.profile.has_ground:
             return deny("Landing denied: this vehicle has no ground under it; use Hold")
         if mode is Mode.TAKEOFF:
@@ -271,6 +275,13 @@ class Machine:
         """An offboard set-point of attitude or rates; returns why it is not taken, or an empty string."""
         return self.offboard.offer(setpoint, sender, now, self.parameters["COM_OF_LOSS_T"])
 
+    def move_sticks(self, axes: Axes, sender: object, now: float) -> str:
+        """Positions of a pilot's sticks; returns why they are not taken, or an empty string."""
+        source = self.parameters.integer("COM_RC_IN_MODE")
+        if source not in JOYSTICK:
+            return f"Sticks ignored: COM_RC_IN_MODE is {source}; set it to 1"
+        return self.sticks.hear(axes, sender, now, self.parameters["COM_RC_LOSS_T"])
+
     def check_plan(self, items: tuple[Item, ...]) -> Fault | None:
         """The first fault of a plan."""
         return plan.check(items, self.profile, self.home_geodetic(), self._guidance.fence())
@@ -309,20 +320,34 @@ class Machine:
     def _react(self, view: VehicleView, now: float, last_station: float | None) -> None:
         if self.stage is Stage.GROUND or self.terminated or self.home is None:
             return
+        self._let_sticks_take_over(now)
         situation = Situation(
-            self.mode is Mode.OFFBOARD, self._setpoint_fresh(now), last_station, self._armed_at
+            self.mode, self._setpoint_fresh(now), self.sticks.time, last_station, self._armed_at
         )
         fence = self._guidance.fence(view.load_attached)
         for trigger in self.failsafes.check(view, now, situation, self.parameters, fence):
             self.say(trigger.severity, trigger.text)
             if trigger.reaction is Reaction.TERMINATE:
                 self._terminate("")
+            elif trigger.to_sticks is not None and self._sticks_fresh(now):
+                self.enter(trigger.to_sticks)
             elif trigger.reaction is Reaction.DISARM:
                 self._disarm("Disarmed by a failsafe: rotors stopped")
                 return
             elif trigger.reaction > _SEVERITY_OF_MODE.get(self.mode, Reaction.NONE):
                 ground = self.profile.has_ground or trigger.reaction is not Reaction.LAND
                 self.enter(_REACTION_MODES[trigger.reaction] if ground else Mode.HOLD)
+
+    def _let_sticks_take_over(self, now: float) -> None:
+        """Sticks that move end an automatic mode, as COM_RC_OVERRIDE has it."""
+        bit = 2 if self.mode is Mode.OFFBOARD else 1
+        wanted = self.parameters.integer("COM_RC_OVERRIDE") & bit and self._sticks_fresh(now)
+        in_the_air = self.stage in (Stage.FLYING, Stage.DESCENT) and not self._guidance.load_is_down
+        if not wanted or self.mode in BY_STICKS or not in_the_air:
+            return
+        if self.sticks.moved(self.parameters["COM_RC_STICK_OV"] / 100.0):
+            self.say(INFO, "Pilot took over by sticks")
+            self.enter(Mode.POSITION)
 
     def _step(self, view: VehicleView, now: float) -> Target:
         if self.terminated:
@@ -333,12 +358,13 @@ class Machine:
             return Idle(False)
         if self.stage is Stage.GROUND:
             return Idle(True)
-        return self._guidance.target(view, self.offboard.latest, self.target)
+        asked = self.offboard.latest
+        if self.mode in BY_STICKS and self.stage is Stage.FLYING:
+            asked = self.sticks.setpoint(view, self.parameters, self.mode is Mode.POSITION)
+        return self._guidance.target(view, asked, self.target)
 
     def _on_ground(self, view: VehicleView, now: float) -> None:
-        if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (
-            self.mode is Mode.OFFBOARD and self._setpoint_fresh(now) and self._setpoint_lifts(view)
-        ):
+        if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (self._setpoint_lifts(view, now)):
             self._guidance.take_off(view)
             return
         steered = self.mode is Mode.OFFBOARD and self._setpoint_fresh(now)
@@ -360,6 +386,9 @@ class Machine:
         if self.mode is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.pause()
         self._guidance.forget_destination()
+        self.sticks.rest()
+        if mode in BY_STICKS and self.view is not None:
+            self.sticks.start(self.view)
         again = mode is self.mode and mode not in (Mode.HOLD, Mode.RTL)
         self.set_mode_to(mode)
         if mode not in (Mode.LAND, Mode.RTL):
@@ -381,13 +410,20 @@ class Machine:
     def _setpoint_fresh(self, now: float) -> bool:
         return self.offboard.fresh(now, self.parameters["COM_OF_LOSS_T"])
 
-    def _setpoint_lifts(self, view: VehicleView) -> bool:
-        """Whether the offboard client wants the vehicle off the ground, by the axes that PX4 looks at."""
+    def _setpoint_lifts(self, view: VehicleView, now: float) -> bool:
+        """Whether pilot or offboard client want the vehicle off the ground, by the axes that PX4 looks at."""
+        if self.mode in BY_STICKS:
+            return self._sticks_fresh(now) and self.sticks.lifts()
         asked = self.offboard.latest
+        if self.mode is not Mode.OFFBOARD or not self._setpoint_fresh(now):
+            return False
         if asked is None or isinstance(asked, Attitude):
             return False
         height = self._vehicle_point(asked.position, asked.of_load)[2]
         return height > view.position[2] + _LIFTS or asked.velocity[2] > 0.0 or asked.acceleration[2] > 0.0
+
+    def _sticks_fresh(self, now: float) -> bool:
+        return self.sticks.fresh(now, self.parameters["COM_RC_LOSS_T"])
 
     def _disarm(self, text: str) -> None:
         self.armed = False

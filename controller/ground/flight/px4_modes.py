@@ -29,6 +29,8 @@ class Mode(Enum):
     RTL = _Numbers(_MAIN_AUTO, 5, 5, 0)
     LAND = _Numbers(_MAIN_AUTO, 6, 7, 0)
     FOLLOW_TARGET = _Numbers(_MAIN_AUTO, 8, 0, 0)
+    POSITION = _Numbers(_MAIN_POSITION, 0, 1, 0)
+    ALTITUDE = _Numbers(2, 0, 4, 0)
     ORBIT = _Numbers(_MAIN_POSITION, 1, 2, 0)
     OFFBOARD = _Numbers(6, 0, 0, _PROPERTY_ADVANCED)
     TERMINATION = _Numbers(10, 0, 0, _PROPERTY_NOT_USER_SELECTABLE)
@@ -54,19 +56,18 @@ class Mode(Enum):
         return {"RTL": "Return", "FOLLOW_TARGET": "Follow Me"}.get(self.name, self.name.capitalize())
 
 
+BY_STICKS = (Mode.POSITION, Mode.ALTITUDE)
 SELECTABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
 _BY_NUMBER = {(mode.value.main, mode.value.sub): mode for mode in SELECTABLE}
 _BY_STANDARD = {mode.standard_mode: mode for mode in SELECTABLE if mode.standard_mode}
 _ELSEWHERE = {
     1: "Manual",
-    2: "Altitude",
-    3: "Position",
     5: "Acro",
     7: "Stabilized",
     8: "Rattitude",
     9: "Simple",
 }
-_FITTING = "use Hold, Takeoff, Mission, Offboard, Return or Land"
+_FITTING = "use Position, Altitude, Hold, Mission, Offboard, Return or Land"
 
 
 def find_mode(main: float, sub: float) -> Mode | str:
@@ -77,7 +78,7 @@ def find_mode(main: float, sub: float) -> Mode | str:
     if found is not None:
         return found
     if int(main) in _ELSEWHERE:
-        return f"{_ELSEWHERE[int(main)]} mode needs a remote control, there is none; {_FITTING}"
+        return f"{_ELSEWHERE[int(main)]} mode has no position control, which the load needs; {_FITTING}"
     if int(main) == Mode.TERMINATION.value.main:
         return "Termination is entered by MAV_CMD_DO_FLIGHTTERMINATION only"
     return f"Mode {int(main)}/{int(sub)} does not exist; {_FITTING}"

@@ -108,7 +108,7 @@ def test_refusals_say_why(tmp_path: Path) -> None:
         client = PyMav(vehicle.mavproxy)
         client.wait_for("HEARTBEAT")
         for number, parameters, text in (
-            (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 1.0), "needs a remote control"),
+            (mavlink.MAV_CMD_DO_SET_MODE, (1.0, 1.0), "no position control"),
             (mavlink.MAV_CMD_MISSION_START, (), "upload one first"),
             (mavlink.MAV_CMD_DO_REPOSITION, (-1.0,), "take off first"),
         ):
