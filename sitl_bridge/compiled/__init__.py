@@ -10,8 +10,8 @@ a call. Imports nothing else of this product; Numba and llvmlite only in the pro
 - `cache`: files of machine code, by key, in a directory of the user's that all checkouts share.
 - `machine_code`: loads such a file through ctypes, or has it compiled.
 - `request`: starts the process that compiles and says how far it is.
-- `builder`, `lowering`, `optimizing`, `linking`: that process. Numba translates each kernel once, LLVM
-  optimises each entry point as a whole, a linker makes a shared library of each module.
+- `builder`, `lowering`, `kernels`, `optimizing`, `linking`: that process. Numba translates each kernel once,
+  LLVM optimises each entry point as a whole, a linker makes a shared library of each module.
 
 Compiled code neither allocates nor raises, and a kernel returns no array but an argument; the build refuses a
 function that would. Uncompiled, the marked functions are plain Python: tests differentiate them with complex

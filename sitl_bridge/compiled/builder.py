@@ -77,8 +77,9 @@ def _begin(module: str, places: list[Path]) -> Answer | _Finish:
     with cache.locked(module, places):  # the process that is started here holds the lock, too, until it ends
         if file := cache.find(module, key, places):
             return Answer(module, key, str(file))
-        from sitl_bridge.compiled import lowering
+        from sitl_bridge.compiled import kernels, lowering
 
+        kernels.places = places
         translated = [(entry, lowering.modules(entry)) for entry in entries.values()]
         return _Finish(module, key, translated, places)
 

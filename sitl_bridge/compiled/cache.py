@@ -18,7 +18,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from pathlib import Path
 from typing import TextIO
 
-SHARED_LIBRARY, OBJECT = ".so", ".o"
+SHARED_LIBRARY, OBJECT, TRANSLATION = ".so", ".o", ".bc"
 _DIGEST_SIZE = hashlib.sha256().digest_size
 _DAY = 86_400.0
 _KEPT = 30 * _DAY
@@ -32,10 +32,12 @@ def directories() -> list[Path]:
     return [directory for directory in (Path(home) / "sitl-bridge", temporary) if directory.is_absolute()]
 
 
-def find(module: str, key: str, places: Sequence[Path]) -> Path | None:
+def find(
+    module: str, key: str, places: Sequence[Path], kinds: Sequence[str] = (SHARED_LIBRARY, OBJECT)
+) -> Path | None:
     """A sound file of this module and key, or None."""
     for directory in places:
-        for kind in (SHARED_LIBRARY, OBJECT):
+        for kind in kinds:
             file = directory / _file_name(module, key, kind)
             try:
                 if not _trusted(directory) or not _sound(file.read_bytes(), key):
@@ -126,7 +128,7 @@ def _mark_used(file: Path) -> None:
 
 
 def _forget_unused(directory: Path, module: str) -> None:
-    for kind in (SHARED_LIBRARY, OBJECT):
+    for kind in (SHARED_LIBRARY, OBJECT, TRANSLATION):
         for file in directory.glob(f"{module}.*{kind}"):
             with suppress(OSError):
                 if time.time() - file.stat().st_mtime > _KEPT:

@@ -12,17 +12,18 @@ import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
-from importlib import metadata, util
-from importlib.abc import InspectLoader
+from importlib import metadata
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from sitl_bridge.compiled.marks import Declaration, mark_of
 
-_COMPILER = ("lowering", "optimizing", "linking")
+_COMPILER = ("lowering", "kernels", "optimizing", "linking")
 _CPU_FIELDS = {
     *("vendor_id", "cpu family", "model", "stepping", "flags"),
     *("CPU implementer", "CPU architecture", "CPU variant", "CPU part", "CPU revision", "Features"),
@@ -32,10 +33,36 @@ _CPU_FIELDS = {
 def key_of(entries: Mapping[str, Declaration]) -> str:
     """Digest of all that decides the machine code of these entry points of a module, by name."""
     description = Description()
-    description.add(machine())
-    description.add(_compiler())
+    description.add(compiler())
     for name, entry in sorted(entries.items()):
         description.add((name, entry.python, entry.arguments, entry.returns))
+    return description.digest()
+
+
+def kernel_key(function: FunctionType, arguments: str) -> str:
+    """Digest of all that decides what a kernel is translated to for these types of arguments."""
+    description = Description()
+    description.add((compiler(), kernel_digest(function), arguments))
+    return description.digest()
+
+
+def kernel_digest(function: FunctionType) -> str:
+    """Digest of a kernel and of all that it calls."""
+    if function not in _digests:
+        _digests[function] = "recursion"
+        description = Description()
+        description.add_body(function)
+        _digests[function] = description.digest()
+    return _digests[function]
+
+
+_digests: WeakKeyDictionary[FunctionType, str] = WeakKeyDictionary()
+
+
+def compiler() -> str:
+    """Digest of the machine, and of the modules that make the code."""
+    description = Description()
+    description.add((machine(), _sources()))
     return description.digest()
 
 
@@ -63,13 +90,12 @@ def _cpu() -> str:
 
 
 @cache
-def _compiler() -> str:
-    """Digest of the modules that make the code."""
+def _sources() -> str:
     description = Description()
     for name in _COMPILER:
-        spec = util.find_spec(f"{__package__}.{name}")
-        if spec is not None and isinstance(spec.loader, InspectLoader):
-            description.add(spec.loader.get_code(spec.name))
+        # Not by the module's own loader: under pytest that is another one.
+        loader = SourceFileLoader(f"{__package__}.{name}", str(Path(__file__).with_name(f"{name}.py")))
+        description.add(loader.get_code(loader.name))
     return description.digest()
 
 
@@ -78,7 +104,6 @@ class Description:
 
     def __init__(self) -> None:
         self._hash = hashlib.sha256()
-        self._seen: dict[int, int] = {}
 
     def digest(self) -> str:
         """Of all that was added, in order; hexadecimal."""
@@ -87,7 +112,7 @@ class Description:
     def add(self, value: Any) -> None:
         """Take in a value that compiled code names, and all that it names in turn."""
         if isinstance(value, FunctionType) and mark_of(value):
-            self._add_kernel(value)
+            self._text(f"kernel {kernel_digest(value)}")
         elif isinstance(value, CodeType):
             self._add_code(value)
         elif isinstance(value, tuple | list):
@@ -109,11 +134,8 @@ class Description:
     def _text(self, text: str) -> None:
         self._hash.update(text.encode() + b"\0")
 
-    def _add_kernel(self, function: FunctionType) -> None:
-        if id(function) in self._seen:
-            self._text(f"kernel {self._seen[id(function)]}")
-            return
-        self._seen[id(function)] = len(self._seen)
+    def add_body(self, function: FunctionType) -> None:
+        """Take in a kernel itself."""
         self._text(str(mark_of(function)))
         self.add(function.__defaults__)
         self._add_code(function.__code__)

@@ -1,8 +1,8 @@
 """From marked Python functions to LLVM modules, by Numba.
 
 Numba usually optimises and loads each function with all that it calls, again and again on the way up. Here
-its library class only collects: one LLVM module for each function, as it was translated. What Numba is asked
-for beyond its public interface is all in this file.
+its library class only collects: one LLVM module for each kernel, as it was translated. What Numba is asked
+for beyond its public interface is all in this file and in `kernels`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numba.core.registry import cpu_target
 from numba.extending import typeof_impl
 from numba.np import arrayobj
 
+from sitl_bridge.compiled import kernels
 from sitl_bridge.compiled.marks import VECTOR_KERNEL, Buffer, Declaration, mark_of
 
 RAISED = "sitl_bridge_raised"
@@ -30,24 +31,10 @@ _POINTER = ir.IntType(8).as_pointer()
 _INT64 = ir.IntType(64)
 
 
-class _Collected(codegen.JITCodeLibrary):  # type: ignore[misc]  # Numba has no types
-    """The LLVM module of one function, and the libraries of those that it calls."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        pass
-
-    def finalize(self) -> None:
-        self._final_module.verify()
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        return 0
-
-
 class _Collecting(codegen.JITCPUCodegen):  # type: ignore[misc]  # Numba has no types
     """Code generation that loads nothing."""
 
-    _library_class = _Collected
+    _library_class = kernels.Collected
 
     def set_env(self, env_name: str, env: Any) -> None:
         pass
@@ -66,9 +53,11 @@ def _context() -> Any:
 def _dispatcher(function: FunctionType) -> Any:
     """Numba's own object for a marked function."""
     options: dict[str, Any] = {"fastmath": {"reassoc"}} if mark_of(function) == VECTOR_KERNEL else {}
-    return numba.njit(
+    dispatcher = numba.njit(
         error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
     )(function)
+    dispatcher._cache = kernels.KernelCache(function)
+    return dispatcher
 
 
 @typeof_impl.register(FunctionType)  # type: ignore[untyped-decorator]  # Numba has no types
@@ -93,7 +82,7 @@ def modules(entry: Declaration) -> list[Any]:
             raise RuntimeError(f"{entry.name} {text}:\n{error}") from None
         raise
     result = dispatcher.overloads[arguments]
-    return [_c_function(entry, context, result.fndesc), *_reachable(result.library)]
+    return [_c_function(entry, context, result.fndesc), *kernels.reachable(result.fndesc.llvm_func_name)]
 
 
 def _type(argument: Any) -> Any:
@@ -101,17 +90,6 @@ def _type(argument: Any) -> Any:
     if isinstance(argument, Buffer):
         return types.Array(numba.from_dtype(np.dtype(argument.dtype)), len(argument.shape), "C")
     return types.int64 if argument is int else types.float64
-
-
-def _reachable(library: Any) -> list[Any]:
-    found: dict[int, Any] = {}
-    waiting = [library]
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, _Collected) and id(each) not in found:  # another is Numba's, for allocation
-            found[id(each)] = each
-            waiting.extend(each._linking_libraries)
-    return [each._final_module for each in found.values()]
 
 
 def _c_function(entry: Declaration, context: Any, callee: Any) -> Any:

@@ -92,7 +92,12 @@ class Sample:
 
 def code_files(cache: Path) -> list[Path]:
     """The files of machine code in a cache."""
-    return sorted(file for file in cache.iterdir() if file.suffix != ".lock")
+    return sorted(file for file in cache.iterdir() if file.suffix in (".so", ".o"))
+
+
+def kernel_files(cache: Path) -> list[Path]:
+    """The files of translated kernels in a cache."""
+    return sorted(cache.glob("kernel.*.bc"))
 
 
 def put(file: Path, content: bytes) -> None:
