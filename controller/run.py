@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +68,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         from controller.pilot.ground_session import Guided
 
         guided = Guided(
-            options.vehicle, options.rate_hz, options.instance, options.ground, speaker.say, assessor
+            options.vehicle, options.rate_hz, options.instance, _ground(options), speaker.say, assessor
         )
         session = new_session(guided.autopilot, options.instance, speaker.say, feedback, options.rate_hz)
     else:
@@ -98,6 +98,13 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     outcome = {"stopped_by": stop.reason, "control_steps": session.steps}
     speaker.event("end", **outcome)
     return outcome
+
+
+def _ground(options: ControllerOptions) -> GroundOptions:
+    """With the flight's folder, whose logs clients may read."""
+    from controller.pilot.ground_link import GroundOptions
+
+    return replace(options.ground or GroundOptions(), logs=options.out)
 
 
 def _estimating(

@@ -11,6 +11,10 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.commands.result import WARNING, Notice
 from controller.ground.commands.service import CommandService
 from controller.ground.commands.setpoints import attitude_setpoint_of, setpoint_of
+from controller.ground.files.ftp import Client as FtpClient
+from controller.ground.files.ftp import Ftp
+from controller.ground.files.logs import MESSAGES as LOG_MESSAGES
+from controller.ground.files.logs import LogProtocol
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.sticks import axes_of
 from controller.ground.link.outbox import Outbox
@@ -26,8 +30,6 @@ from sitl_bridge.mavlink.framing import Frame
 
 _MISSION_COMPONENTS = (0, COMPONENT_AUTOPILOT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 _BROADCAST = 0
-_FTP_ANSWERS = 128
-"""Opcodes of FTP from here on are answers, ACK and NAK"""
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
     mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
@@ -43,6 +45,8 @@ class Inbox:
         parameters: Parameters,
         missions: Missions,
         commands: CommandService,
+        ftp: Ftp,
+        logs: LogProtocol,
         out: Outbox,
         peers: Peers,
     ) -> None:
@@ -51,6 +55,8 @@ class Inbox:
         self._parameters = parameters
         self._missions = missions
         self._commands = commands
+        self._ftp = ftp
+        self._logs = logs
         self._out = out
         self._peers = peers
 
@@ -200,18 +206,19 @@ class Inbox:
             time = now if view is None else view.time
             self._out.send(peer, mavlink.MAVLink_timesync_message(int(time * 1e9), message.ts1), now)
 
-    def _refuse_ftp(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
-        """FTP's negative acknowledgement, at once: clients then use the other protocols."""
-        if message.target_system != self._profile.system:
+    def _file_transfer(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if message.target_system not in (_BROADCAST, self._profile.system):
             return
-        request = bytes(message.payload)
-        if request[3] >= _FTP_ANSWERS:
-            return  # two ends that refuse each other's refusals would never stop
-        sequence = int.from_bytes(request[:2], "little") + 1 & 0xFFFF
-        # Sequence, session, NAK, size 1, requested opcode, burst, padding, offset; UnknownCommand.
-        answer = sequence.to_bytes(2, "little") + bytes((request[2], 129, 1, request[3], 0, 0, 0, 0, 0, 0, 7))
-        ftp = mavlink.MAVLink_file_transfer_protocol_message
-        self._out.send(peer, ftp(0, frame.system, frame.component, answer.ljust(251, b"\0")), now)
+        client = FtpClient(peer.address, frame.system, frame.component)
+        answer = self._ftp.receive(bytes(message.payload), client, now)
+        if answer is not None:
+            ftp = mavlink.MAVLink_file_transfer_protocol_message
+            self._out.send(peer, ftp(0, frame.system, frame.component, answer), now)
+
+    def _log(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        if message.target_system in (_BROADCAST, self._profile.system):
+            reply, say = self._talk(frame, peer, now)
+            self._logs.receive(message, peer.address, now, reply, say)
 
 
 _Handler = Callable[[Inbox, Any, Frame, Peer, float], None]
@@ -230,6 +237,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: Inbox._sticks,
     mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
     mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
+    **dict.fromkeys(LOG_MESSAGES, Inbox._log),
     mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,
-    mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: Inbox._refuse_ftp,
+    mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: Inbox._file_transfer,
 }

@@ -12,6 +12,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import WARNING, Notice
 from controller.ground.commands.service import CommandService
+from controller.ground.files.ftp import Ftp
+from controller.ground.files.logs import LogProtocol, LogStore, NoLogs
+from controller.ground.files.virtual import VirtualFiles
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.px4_modes import Mode
@@ -80,6 +83,7 @@ class Station:
         storage: ParameterFile | None = None,
         signing: Signing | None = None,
         peers: tuple[Address, ...] | None = None,
+        logs: LogStore | None = None,
     ) -> None:
         self.profile = profile
         self.parameters = Parameters(_own_defaults(profile))
@@ -97,8 +101,17 @@ class Station:
         )
         self._commands = CommandService(self.machine, self._out, stored, self._built, self._show_state)
         self.plant_commands = self._commands.plant
+        self._logs = LogProtocol(logs or NoLogs())
+        self._ftp = Ftp(VirtualFiles(self.parameters, self._logs))
         self._inbox = Inbox(
-            self.machine, self.parameters, self.missions, self._commands, self._out, self.peers
+            self.machine,
+            self.parameters,
+            self.missions,
+            self._commands,
+            self._ftp,
+            self._logs,
+            self._out,
+            self.peers,
         )
         self._housekeeping = now
         self._due = now
@@ -145,6 +158,7 @@ class Station:
         """A peer is no more: what was under way with it ends."""
         self.missions.forget(address)
         self._load.forget(address)
+        self._ftp.forget(address)
 
     def hear_plant(self, frame: Frame, now: float) -> None:
         """What the plant says: the load's own messages, and answers to what was passed on to it."""
@@ -228,6 +242,11 @@ class Station:
                 self._out.send(table[client.peer], message, now)
                 if text:
                     self._out.say(table[client.peer], Notice(WARNING, text), now)
+        for address, data in self._logs.to_send(table.__contains__, now):
+            self._out.send(table[address], data, now)
+        for reader, part in self._ftp.to_send(table.__contains__, now):
+            ftp = mavlink.MAVLink_file_transfer_protocol_message
+            self._out.send(table[reader.peer], ftp(0, reader.system, reader.component, part), now)
         out: list[tuple[Address, bytes]] = []
         for peer in table.values():
             out.extend((peer.address, raw) for raw in peer.queue)
@@ -236,6 +255,8 @@ class Station:
             self._housekeeping,
             self.parameters.next_deadline(),
             self.missions.next_deadline(),
+            self._logs.next_deadline(),
+            self._ftp.next_deadline(),
             *(peer.streams.next for peer in table.values()),
         )
         return out

@@ -14,6 +14,7 @@ from controller.ground.link.sockets import GroundSockets
 from controller.ground.parameters.file import ParameterFile
 from controller.ground.station import ONBOARD_LINK, STATION_LINK, Station, local_ports, standard_peers
 from controller.ground.telemetry.vehicle_state import profile_of
+from controller.pilot.log_folder import LogFolder
 from sitl_bridge.vehicle.description import Vehicle
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
@@ -36,6 +37,8 @@ class GroundOptions:
     signing_key: Path | None = None
     parameters: Path | None = None
     exposed: bool = False
+    logs: Path | None = None
+    """The folder of the flight's logs, which clients may read"""
 
 
 class GroundLink:
@@ -66,7 +69,8 @@ class GroundLink:
             numbers = " and ".join(str(port.local) for port in ports)
             raise OSError(f"ground control's UDP ports {numbers}: {error.strerror or error}") from None
         profile = profile_of(vehicle, instance, has_ground=vehicle.ground is not None)
-        self.station = Station(profile, time.monotonic(), storage, signing, peers)
+        logs = None if options.logs is None else LogFolder(options.logs)
+        self.station = Station(profile, time.monotonic(), storage, signing, peers, logs)
         self._signing = signing
         # Of the parameter file; clients may attach too late for them.
         for notice in self.station.machine.notices:

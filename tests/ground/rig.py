@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.files.logs import LogStore
 from controller.ground.link.peers import Address
 from controller.ground.link.signing import Signing
 from controller.ground.parameters.file import ParameterFile
@@ -134,10 +135,11 @@ class Rig:
         storage: ParameterFile | None = None,
         signing: Signing | None = None,
         view: VehicleView | None = None,
+        logs: LogStore | None = None,
     ) -> None:
         self.now = 100.0
         self.profile = profile
-        self.station = Station(profile, self.now, storage, signing)
+        self.station = Station(profile, self.now, storage, signing, logs=logs)
         self.view = view or grounded_view()
         self.clients: list[Client] = []
         self.target: Any = None

@@ -168,7 +168,7 @@ def test_who_the_vehicle_is() -> None:
     version = client.got("AUTOPILOT_VERSION")[0]
     assert version.capabilities == CAPABILITIES
     assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-    assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     assert version.uid != 0
 
 

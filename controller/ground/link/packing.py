@@ -81,6 +81,38 @@ class FigureEightStatus(mavlink.MAVLink_message):  # type: ignore[misc]
         return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
 
 
+class ComponentMetadata(mavlink.MAVLink_message):  # type: ignore[misc]
+    """COMPONENT_METADATA (397) of the current `common` dialect: where the general metadata file is."""
+
+    id = 397
+    crc_extra = 182
+    _layout = struct.Struct("<II100s")
+
+    def __init__(self, time_boot_ms: int, file_crc: int, uri: str) -> None:
+        super().__init__(self.id, "COMPONENT_METADATA")
+        self._fields = (time_boot_ms, file_crc, uri.encode())
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
+
+
+class ComponentInformation(mavlink.MAVLink_message):  # type: ignore[misc]
+    """COMPONENT_INFORMATION (395), which older clients ask for instead; there are no peripherals."""
+
+    id = 395
+    crc_extra = 0
+    _layout = struct.Struct("<III100s100s")
+
+    def __init__(self, time_boot_ms: int, file_crc: int, uri: str) -> None:
+        super().__init__(self.id, "COMPONENT_INFORMATION")
+        self._fields = (time_boot_ms, file_crc, 0, uri.encode(), b"")
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
+
+
 def payload_of(message: Any) -> bytes:
     """The untruncated payload of a pymavlink message. Raises struct.error if a field does not fit."""
     message._pack = lambda _mav, _extra, payload, force_mavlink1=False: payload

@@ -84,6 +84,11 @@ class Parameters:
         """Every value by name, integers as `int`."""
         return {p.name: int(self[p.name]) if p.is_integer else self[p.name] for p in TABLE}
 
+    def defaults(self) -> dict[str, float]:
+        """Every default by name, integers as `int`."""
+        own = self._defaults
+        return {p.name: int(own[p.name]) if p.is_integer else own[p.name] for p in TABLE}
+
     def load(self, values: Mapping[str, Any]) -> list[str]:
         """Take values from a file; returns a line for each that is not taken."""
         faults = []

@@ -9,13 +9,20 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.setpoints import NOTHING
+from controller.ground.files import metadata
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.patterns import FigureEight, Orbit
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
 from controller.ground.link.heartbeat import heartbeat
-from controller.ground.link.packing import AvailableModes, CurrentMode, FigureEightStatus
+from controller.ground.link.packing import (
+    AvailableModes,
+    ComponentInformation,
+    ComponentMetadata,
+    CurrentMode,
+    FigureEightStatus,
+)
 from controller.ground.telemetry.vehicle_state import VehicleView
 from sitl_bridge.frames import (
     CENTIAMPERES_PER_AMPERE,
@@ -48,6 +55,7 @@ from sitl_bridge.mavlink.fields import (
 CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_FTP
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
@@ -425,6 +433,10 @@ def build(message_id: int, machine: Machine) -> Any:
         return heartbeat(machine)
     if message_id == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
         return autopilot_version(machine)
+    if message_id in (ComponentMetadata.id, ComponentInformation.id):
+        kind = ComponentMetadata if message_id == ComponentMetadata.id else ComponentInformation
+        time = 0 if machine.view is None else _milliseconds(machine.view)
+        return kind(time, metadata.general_crc(), metadata.uri(metadata.GENERAL))
     if message_id == CurrentMode.id:
         return _current_mode(machine)
     if message_id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
