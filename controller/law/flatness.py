@@ -2,8 +2,9 @@
 
 The load's position is a flat output: its acceleration says how hard and which way the cable pulls, hence
 where the vehicle is; the vehicle's acceleration says how hard and which way it thrusts, hence its attitude.
-Time derivatives along the path are central differences over a few milliseconds, exact to the path's own
-smoothness; the moments, which an airframe's small inertia makes negligible here, are left to the feedback.
+The attitude's own acceleration says what moments that takes. Gains scale with the inertia, so even a small
+one counts. Time derivatives along the path are central differences over a few milliseconds, exact to the
+path's own smoothness.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ BODY = np.dtype(
     [
         ("gravity", "f8"),
         ("vehicle_mass", "f8"),
+        ("inertia", "f8", 3),
         ("load_mass", "f8"),
         ("stiffness", "f8"),
         ("damping", "f8"),
@@ -54,6 +56,7 @@ def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
     record[0] = (
         vehicle.gravity,
         vehicle.airframe.mass,
+        vehicle.airframe.inertia,
         vehicle.load.mass if loaded else 0.0,
         cable.stiffness,
         cable.damping,
@@ -90,29 +93,16 @@ def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
 
 
 @kernel
-def flat_motion(
-    b: Any, path: Any, t: float, lead: float, heading: Array, stencil: Any, state: Array, wrench: Array
-) -> None:
-    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path.
+def _lean(b: Any, path: Any, t: float, heading: Array, stencil: Any) -> None:
+    """Load, vehicle and cable around time t (s), and around it thrust and tilt: the stencil's points.
 
-    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading.
+    heading: (2,), cosine and sine of the path's yaw; roll and pitch are towards this heading.
     """
     h = STENCIL_STEP
-    at_rest = not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h
-    first, last = (POINTS // 2, POINTS // 2 + 1) if at_rest else (0, POINTS)
-    for j in range(first, last):
+    for j in range(POINTS):
         feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
         _hang(b, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
-    for i in range(18):
-        state[i] = 0.0
-    for i in range(3):
-        state[i] = stencil.vehicle[2, i]
-        state[3 + i] = stencil.load[2, i]
-    state[17] = path.yaw
-    wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
-    if at_rest:
-        return
-    for j in range(1, 4):
+    for j in range(1, POINTS - 1):
         for i in range(3):
             before, here, after = stencil.vehicle[j - 1, i], stencil.vehicle[j, i], stencil.vehicle[j + 1, i]
             acceleration = (before - 2.0 * here + after) / (h * h)
@@ -123,16 +113,79 @@ def flat_motion(
         stencil.thrust[j] = math.sqrt(x * x + y * y + z * z)
         stencil.tilt[j, 0] = -math.asin(y / stencil.thrust[j])
         stencil.tilt[j, 1] = math.atan2(x, z)
-    for i in range(3):
-        state[6 + i] = (stencil.vehicle[3, i] - stencil.vehicle[1, i]) / (2.0 * h)
-        state[9 + i] = (stencil.load[3, i] - stencil.load[1, i]) / (2.0 * h)
+
+
+@kernel
+def _body_rates(stencil: Any, yaw_rate: float) -> tuple[float, float, float]:
+    """Body rates p, q, r (rad/s) at the stencil's middle, from Euler rates (eq. 14)."""
+    h = STENCIL_STEP
     roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
     roll_rate = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
     pitch_rate = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
-    # Body rates from Euler rates (eq. 14).
-    upright = math.cos(pitch) * path.yaw_rate
-    state[12] = roll_rate - math.sin(pitch) * path.yaw_rate
-    state[13] = math.cos(roll) * pitch_rate + math.sin(roll) * upright
-    state[14] = -math.sin(roll) * pitch_rate + math.cos(roll) * upright
-    state[15], state[16] = roll, pitch
-    wrench[0] = stencil.thrust[2] + lead * (stencil.thrust[3] - stencil.thrust[1]) / (2.0 * h)
+    upright = math.cos(pitch) * yaw_rate
+    return (
+        roll_rate - math.sin(pitch) * yaw_rate,
+        math.cos(roll) * pitch_rate + math.sin(roll) * upright,
+        -math.sin(roll) * pitch_rate + math.cos(roll) * upright,
+    )
+
+
+@kernel
+def _moments(b: Any, stencil: Any, yaw_rate: float, wrench: Array) -> None:
+    """M = I w' + w x I w at the stencil's middle: wrench[1:4], N m. The yaw rate is taken for constant."""
+    h = STENCIL_STEP
+    roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
+    d_roll = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
+    d_pitch = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
+    dd_roll = (stencil.tilt[3, 0] - 2.0 * roll + stencil.tilt[1, 0]) / (h * h)
+    dd_pitch = (stencil.tilt[3, 1] - 2.0 * pitch + stencil.tilt[1, 1]) / (h * h)
+    s_roll, c_roll, s_pitch, c_pitch = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
+    dp = dd_roll - c_pitch * d_pitch * yaw_rate
+    dq = (
+        c_roll * dd_pitch
+        - s_roll * d_roll * d_pitch
+        + (c_roll * d_roll * c_pitch - s_roll * s_pitch * d_pitch) * yaw_rate
+    )
+    dr = (
+        -s_roll * dd_pitch
+        - c_roll * d_roll * d_pitch
+        - (s_roll * d_roll * c_pitch + c_roll * s_pitch * d_pitch) * yaw_rate
+    )
+    p, q, r = _body_rates(stencil, yaw_rate)
+    i_x, i_y, i_z = b.inertia[0], b.inertia[1], b.inertia[2]
+    wrench[1] = i_x * dp + (i_z - i_y) * q * r
+    wrench[2] = i_y * dq + (i_x - i_z) * r * p
+    wrench[3] = i_z * dr + (i_y - i_x) * p * q
+
+
+@kernel
+def flat_motion(
+    b: Any, path: Any, t: float, lead: float, heading: Array, stencil: Any, state: Array, wrench: Array
+) -> None:
+    """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path.
+
+    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading.
+    """
+    h = STENCIL_STEP
+    for i in range(18):
+        state[i] = 0.0
+    state[17] = path.yaw
+    if not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h:  # at rest
+        feasible(path, t, stencil.derivatives, stencil.smooth_step)
+        _hang(b, stencil.derivatives, stencil.load[2], stencil.vehicle[2], stencil.pull[2])
+        for i in range(3):
+            state[i] = stencil.vehicle[2, i]
+            state[3 + i] = stencil.load[2, i]
+        wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
+        return
+    _lean(b, path, t + lead, heading, stencil)
+    wrench[0] = stencil.thrust[2]
+    _moments(b, stencil, path.yaw_rate, wrench)
+    _lean(b, path, t, heading, stencil)
+    for i in range(3):
+        state[i] = stencil.vehicle[2, i]
+        state[3 + i] = stencil.load[2, i]
+        state[6 + i] = (stencil.vehicle[3, i] - stencil.vehicle[1, i]) / (2.0 * h)
+        state[9 + i] = (stencil.load[3, i] - stencil.load[1, i]) / (2.0 * h)
+    state[12], state[13], state[14] = _body_rates(stencil, path.yaw_rate)
+    state[15], state[16] = stencil.tilt[2, 0], stencil.tilt[2, 1]

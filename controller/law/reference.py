@@ -37,11 +37,15 @@ PATH = np.dtype(
 
 Path = NDArray[np.void]
 
-# The smooth step: the polynomial of degree 2N+1 from 0 to 1 whose first N derivatives vanish at both ends.
-_SMOOTH_STEP = np.zeros(2 * DERIVATIVES + 2)
-for _k in range(DERIVATIVES + 1):
-    _SMOOTH_STEP[DERIVATIVES + 1 + _k] = (
-        (-1.0) ** _k * math.comb(DERIVATIVES + _k, _k) * math.comb(2 * DERIVATIVES + 1, DERIVATIVES - _k)
+RAMP_DERIVATIVES = DERIVATIVES + 1
+"""Derivatives of the ramp that vanish at both ends: its moments begin and end without a jump."""
+SMOOTH_STEP = np.zeros(2 * RAMP_DERIVATIVES + 2)
+"""Coefficients of the polynomial of degree 2N+1 from 0 to 1 whose first N derivatives vanish at both ends."""
+for _k in range(RAMP_DERIVATIVES + 1):
+    SMOOTH_STEP[RAMP_DERIVATIVES + 1 + _k] = (
+        (-1.0) ** _k
+        * math.comb(RAMP_DERIVATIVES + _k, _k)
+        * math.comb(2 * RAMP_DERIVATIVES + 1, RAMP_DERIVATIVES - _k)
     )
 _BINOMIAL = np.array(
     [[math.comb(n, k) for k in range(DERIVATIVES + 1)] for n in range(DERIVATIVES + 1)], dtype=np.float64
@@ -50,7 +54,7 @@ _BINOMIAL = np.array(
 
 def _peak(order: int) -> float:
     """Largest magnitude of a derivative of the smooth step over 0..1."""
-    polynomial = np.polynomial.Polynomial(_SMOOTH_STEP).deriv(order)
+    polynomial = np.polynomial.Polynomial(SMOOTH_STEP).deriv(order)
     return float(np.max(np.abs(polynomial(np.linspace(0.0, 1.0, 2001)))))
 
 
@@ -134,15 +138,22 @@ def path_derivatives(path: Any, t: float, out: Array) -> None:
 
 @kernel
 def smooth_step(s: float, out: Array) -> None:
-    """The smooth step at s in 0..1: out (6,) are its value and its derivatives with respect to s."""
+    """The smooth step at s in 0..1: out (6,) are its value and its derivatives with respect to s.
+
+    Its second half is the first one mirrored: near 1 the polynomial itself would lose its last digits.
+    """
+    mirrored = s > 0.5
+    x = 1.0 - s if mirrored else s
     for k in range(DERIVATIVES + 1):
         value = 0.0
-        for power in range(2 * DERIVATIVES + 1, k - 1, -1):
-            factor = _SMOOTH_STEP[power]
+        for power in range(2 * RAMP_DERIVATIVES + 1, k - 1, -1):
+            factor = SMOOTH_STEP[power]
             for j in range(k):
                 factor *= power - j
-            value = value * s + factor
-        out[k] = value
+            value = value * x + factor
+        out[k] = -value if mirrored and k % 2 == 0 else value
+    if mirrored:
+        out[0] += 1.0
 
 
 @kernel

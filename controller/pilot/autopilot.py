@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.design.catalogue import design
+from controller.design.ramp import planned
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation
@@ -27,6 +28,7 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
+        self._vehicle = vehicle
         self._path_from = path_from
         self._design = design(design_name, vehicle, rate_hz)
         self._allocation = allocation(vehicle)
@@ -49,6 +51,7 @@ class Autopilot:
         if self._step is None:
             load = estimate[LOAD_POSITION]
             path = self._path_from((float(load[0]), float(load[1]), float(load[2])))
+            path = planned(path, self._vehicle)
             law = (self._design, self._allocation, path, engaged_memory(load), np.zeros(1, dtype=WORK))
             self._step = control_step.bind(*law, estimate, self._controls)
             self.law = law
