@@ -25,7 +25,7 @@ from controller.ground.flight.setpoint_types import (
     Target,
     Terminate,
 )
-from controller.ground.flight.trajectory import Limits, Trajectory
+from controller.ground.flight.trajectory import Limits, Trajectory, motion_pole
 from controller.ground.link.packing import decoded
 from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import VehicleView
@@ -109,7 +109,7 @@ class GuidedAutopilot:
         self._controls = controls
         self._allocation = allocation(vehicle)
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
-        self._trajectory = Trajectory(self._period)
+        self._trajectory = Trajectory(self._period, motion_pole(vehicle.hover_length, vehicle.gravity))
         thrust = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
         weight = vehicle.gravity * (vehicle.airframe.mass + vehicle.load.mass)
         spare = THRUST_SHARE * thrust / weight - 1.0

@@ -11,7 +11,14 @@ from scipy import signal
 
 from controller.design.catalogue import guided_designs
 from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
-from controller.ground.flight.trajectory import MOST_JERK, POLE, Limits, Trajectory, stopping_distance
+from controller.ground.flight.trajectory import (
+    FASTEST_POLE,
+    MOST_JERK,
+    Limits,
+    Trajectory,
+    motion_pole,
+    stopping_distance,
+)
 from controller.law.allocation import MOST_ROTORS, allocation
 from controller.law.control_law import WORK, engaged_memory
 from controller.law.control_step import control_step
@@ -93,10 +100,10 @@ def test_a_trajectory_of_set_points_is_followed_without_lag() -> None:
 def sharpest(order: int) -> float:
     """Largest derivative of a motion whose carrot changes its acceleration from one limit to the other.
 
-    The motion's transfer function from the carrot's acceleration is POLE^5 s^(order - 2) / (s + POLE)^5.
+    The motion's transfer function from the carrot's acceleration is p^5 s^(order - 2) / (s + p)^5.
     """
-    numerator = [POLE**DERIVATIVES, *[0.0] * (order - 2)]
-    system = signal.TransferFunction(numerator, np.poly([-POLE] * DERIVATIVES))
+    numerator = [FASTEST_POLE**DERIVATIVES, *[0.0] * (order - 2)]
+    system = signal.TransferFunction(numerator, np.poly([-FASTEST_POLE] * DERIVATIVES))
     _, response = signal.step(system, T=np.linspace(0.0, 4.0, 4001))
     return float(2.0 * LIMITS.acceleration * np.abs(response).max())
 
@@ -187,3 +194,19 @@ def test_a_law_that_looks_elsewhere_does_the_same(law: int) -> None:
         commands.append(controls[:4].copy())
     np.testing.assert_allclose(commands[1], commands[0], rtol=1e-6)
     np.testing.assert_allclose(commands[2], commands[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("length", [0.5, 1.55, 8.0, 20.0, 50.0])
+def test_the_vehicles_share_of_a_reversal_stays_small_on_any_cable(length: float) -> None:
+    """The vehicle accelerates by the load's acceleration and l/g times its snap, however long the cable."""
+    pole = motion_pole(length, 9.81)
+    trajectory = Trajectory(PERIOD, pole)
+    trajectory.start(np.zeros(3), np.zeros(3), 0.0)
+    there, back = (Goto(Body.LOAD, (x, 0.0, 5.0), 0.0, LIMITS.speed) for x in (20.0, -20.0))
+    worst = 0.0
+    for k in range(round(40.0 / PERIOD)):
+        target = there if k * PERIOD < 8.0 else back
+        trajectory.advance(target, LIMITS, k * PERIOD)
+        motion = trajectory.path["motion"][0]
+        worst = max(worst, abs(float(motion[2, 0] + length / 9.81 * motion[4, 0])))
+    assert worst < 3.0 * LIMITS.acceleration

@@ -57,12 +57,13 @@ def limited_velocity(velocity: Triple, p: Parameters) -> Triple:
     return (velocity[0] * scale, velocity[1] * scale, up)
 
 
-def too_deep(asked: float, own: float, room: float, p: Parameters) -> bool:
+def too_deep(asked: float, own: float, room: float, p: Parameters, pole: float) -> bool:
     """Whether a body that is `room` (m) above a floor has to stop now.
 
-    Upwards: `asked`, its set-point's velocity (m/s, NaN: none), and `own`, which it has.
+    Upwards: `asked`, its set-point's velocity (m/s, NaN: none), and `own`, which it has. pole: 1/s, of the
+    motion.
     """
-    return asked < 0.0 and room <= stopping_distance(-min(asked, own), p["MPC_ACC_HOR"])
+    return asked < 0.0 and room <= stopping_distance(-min(asked, own), p["MPC_ACC_HOR"], pole)
 
 
 def limited_speed(speed: float, p: Parameters) -> float:
@@ -70,14 +71,14 @@ def limited_speed(speed: float, p: Parameters) -> float:
     return min(speed if speed > 0 else p["MPC_XY_CRUISE"], p["MPC_XY_VEL_MAX"])
 
 
-def stopping_point(view: VehicleView, p: Parameters) -> Triple:
-    """Where the controlled body comes to rest if it brakes now, m."""
+def stopping_point(view: VehicleView, p: Parameters, pole: float) -> Triple:
+    """Where the controlled body comes to rest if it brakes now, m. pole: of the motion, 1/s."""
     position, velocity = (
         (view.load_position, view.load_velocity) if view.load_attached else (view.position, view.velocity)
     )
     speed = math.hypot(*velocity)
     if speed == 0.0:
         return position
-    share = stopping_distance(speed, p["MPC_ACC_HOR"]) / speed
+    share = stopping_distance(speed, p["MPC_ACC_HOR"], pole) / speed
     x, y, z = (place + v * share for place, v in zip(position, velocity, strict=True))
     return (x, y, z)

@@ -32,6 +32,7 @@ from controller.ground.flight.patterns import Orbit, Pattern, Yaw
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.return_home import ReturnHome
 from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
+from controller.ground.flight.trajectory import motion_pole
 from controller.ground.missions import mission_plan as plan
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
@@ -85,6 +86,7 @@ class Guidance:
         self.landed_at = -math.inf
         """s of the plant's time, when the last landing was over"""
         self._profile = profile
+        self._pole = motion_pole(profile.hover_length, profile.gravity)
         self._parameters = parameters
         self._mission = mission
         self._pilot = pilot
@@ -153,7 +155,7 @@ class Guidance:
 
     def hold_here(self, view: VehicleView) -> None:
         """Come to rest, and stay."""
-        x, y, z = stopping_point(view, self._parameters)
+        x, y, z = stopping_point(view, self._parameters, self._pole)
         least = min(self._floor(view), self._height(view))
         self._stay_at((x, y, max(z, least)), controlled_body(view))
         self._yaw = euler_from_quaternion(view.attitude)[2]
@@ -256,7 +258,7 @@ class Guidance:
             if done:
                 self._stay_at(reached.position, reached.body)
             else:
-                self._stay_at(stopping_point(view, self._parameters), controlled_body(view))
+                self._stay_at(stopping_point(view, self._parameters, self._pole), controlled_body(view))
             if mode is Mode.TAKEOFF:
                 self._pilot.set_mode_to(Mode.HOLD)
             self.start(self._pilot.mode)
@@ -285,7 +287,7 @@ class Guidance:
     def _fly(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:
         mode = self._pilot.mode
         if mode is Mode.LAND:
-            self._land(view, stopping_point(view, self._parameters))
+            self._land(view, stopping_point(view, self._parameters, self._pole))
             return self._descend(self._descent, view, last) if self._descent else self._hold(view)
         if mode is Mode.RTL:
             return self._return_home(view)
@@ -437,7 +439,7 @@ class Guidance:
         """Whether a set-point's upward velocity (m/s) has to end at the floor now; says so once."""
         room = self._height(view) - self._floor(view) - (_STAY_AT_FLOOR if self._at_floor else 0.0)
         own = (view.load_velocity if view.load_attached else view.velocity)[2]
-        return self._note_depth(too_deep(velocity, own, room, self._parameters), view)
+        return self._note_depth(too_deep(velocity, own, room, self._parameters, self._pole), view)
 
     def _note_depth(self, deep: bool, view: VehicleView) -> bool:
         """Whether a set-point is too deep, told once for each time that it becomes so."""

@@ -21,10 +21,10 @@ from controller.law.reference import DERIVATIVES, Path, local_path
 from controller.law.state import Array
 from sitl_bridge.frames import Triple
 
-POLE = 6.0
+FASTEST_POLE = 6.0
 """1/s, of the reference model; five of them: it settles in some 2 s"""
-LAG = DERIVATIVES / POLE
-"""s, by which the motion trails a carrot of steady speed"""
+POLE_SHARE = 8.0
+"""Of g over the cable's length, that the pole's square is at most"""
 APPROACH = 1.5
 """1/s, with which the carrot's last bit of way to a point decays"""
 CLOSING = 5.0
@@ -60,30 +60,44 @@ class Limits(NamedTuple):
     """m/s"""
 
 
-def stopping_distance(speed: float, acceleration: float) -> float:
-    """m on which a motion at `speed` (m/s) comes to rest without turning back."""
-    return speed * (LAG + 0.5 * speed / (BRAKING_SHARE * acceleration))
+def motion_pole(length: float, gravity: float) -> float:
+    """The reference model's pole, 1/s, for a load on a cable of this length (m).
+
+    The vehicle's acceleration is the load's plus l/g times its snap. Behind a step of the carrot's
+    acceleration the snap reaches a tenth of the step times the pole squared. That has to stay a share of the
+    step.
+    """
+    return min(FASTEST_POLE, math.sqrt(POLE_SHARE * gravity / length))
 
 
-_FEEDBACK = np.array([math.comb(DERIVATIVES, k) * POLE ** (DERIVATIVES - k) for k in range(DERIVATIVES)])
-"""a_k of the reference model r(5) = a_0·c - sum of a_k·r(k), (s + POLE)^5 = s^5 + a_4 s^4 + … + a_0.
+def stopping_distance(speed: float, acceleration: float, pole: float = FASTEST_POLE) -> float:
+    """m on which a motion at `speed` (m/s) comes to rest without turning back.
 
-c is the carrot: the motion is the carrot seen through a positive window. It lags, and keeps every limit that
-the carrot keeps.
-"""
+    The motion trails a carrot of steady speed by DERIVATIVES / pole seconds.
+    """
+    return speed * (DERIVATIVES / pole + 0.5 * speed / (BRAKING_SHARE * acceleration))
+
+
+def _feedback(pole: float) -> Array:
+    """a_k (5,) of the reference model r(5) = a_0·c - sum of a_k·r(k), (s + p)^5 = s^5 + a_4 s^4 + … + a_0.
+
+    c is the carrot: the motion is the carrot seen through a positive window. It lags, and keeps every limit
+    that the carrot keeps.
+    """
+    return np.array([math.comb(DERIVATIVES, k) * pole ** (DERIVATIVES - k) for k in range(DERIVATIVES)])
+
+
 _BASE = 4
 """Position and derivatives of a base"""
-_AHEAD = _FEEDBACK[:_BASE] / _FEEDBACK[0]
-"""The carrot that belongs to a motion: c = (1 + D/POLE)^5 r"""
 
 
-def _transitions(period: float) -> tuple[Array, Array]:
+def _transitions(period: float, feedback: Array) -> tuple[Array, Array]:
     """What a period makes of a motion (5, 3), and what the carrot (3, 3), a parabola in it, adds to that."""
     order = DERIVATIVES
     a = np.zeros((order + 3, order + 3))
     a[: order - 1, 1:order] = np.eye(order - 1)
-    a[order - 1, :order] = -_FEEDBACK
-    a[order - 1, order] = _FEEDBACK[0]
+    a[order - 1, :order] = -feedback
+    a[order - 1, order] = feedback[0]
     a[order, order + 1] = a[order + 1, order + 2] = 1.0
     transition = linalg.expm(a * period)
     return transition[:order, :order], transition[:order, order:]
@@ -92,11 +106,16 @@ def _transitions(period: float) -> tuple[Array, Array]:
 class Trajectory:
     """The reference of one law; `path` (1,) is what the law follows."""
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, pole: float = FASTEST_POLE) -> None:
+        """period: s, of the law; pole: 1/s, see `motion_pole`."""
         self.path: Path = local_path()
+        self._pole = pole
+        self._feedback = _feedback(pole)
+        self._ahead = self._feedback[:_BASE] / self._feedback[0]
+        """The carrot that belongs to a motion: c = (1 + D/pole)^5 r"""
         self._period = period
         self._motion: Array = self.path["motion"][0]
-        self._own, self._pull = _transitions(period)
+        self._own, self._pull = _transitions(period, self._feedback)
         self._coast = linalg.expm(np.eye(_BASE, k=1) * period)
         self._base = np.zeros((_BASE, 3))
         """Position, velocity, acceleration, jerk"""
@@ -112,7 +131,8 @@ class Trajectory:
         self._base[:] = 0.0
         self._gap[:] = 0.0
         self._gap[0], self._gap[1] = position, velocity
-        self._carrot[0], self._carrot[1], self._carrot[2] = position + LAG * velocity, velocity, 0.0
+        self._carrot[0] = position + DERIVATIVES / self._pole * velocity
+        self._carrot[1], self._carrot[2] = velocity, 0.0
         self._motion[:] = self._gap
         self.path["yaw"], self.path["yaw_rate"] = yaw, 0.0
         self._target = None
@@ -128,7 +148,7 @@ class Trajectory:
         before[2] = self._carrot[2]
         gap = self._gap
         gap[:DERIVATIVES] = self._own @ gap[:DERIVATIVES] + self._pull @ before
-        gap[DERIVATIVES] = _FEEDBACK[0] * self._carrot[0] - _FEEDBACK @ gap[:DERIVATIVES]
+        gap[DERIVATIVES] = self._feedback[0] * self._carrot[0] - self._feedback @ gap[:DERIVATIVES]
         self._base = self._coast @ self._base
         self._motion[:] = gap
         self._motion[:_BASE] += self._base
@@ -168,8 +188,8 @@ class Trajectory:
         jump = base - self._base
         self._base = base
         self._gap[:_BASE] -= jump
-        self._carrot[0] -= _AHEAD @ jump
-        self._carrot[1] -= _AHEAD[:-1] @ jump[1:]
+        self._carrot[0] -= self._ahead @ jump
+        self._carrot[1] -= self._ahead[:-1] @ jump[1:]
 
     def _move_carrot(self, target: Goto | Land | Follow, limits: Limits) -> None:
         dt = self._period
