@@ -109,12 +109,12 @@ class Flown:
             assert self.now < end, f"not within {timeout:g} s; {self.station.machine.mode}"
             self.tick()
 
-    def take_off(self, client: Client) -> None:
+    def take_off(self, client: Client, timeout: float = 60.0) -> None:
         """Arm, take off and wait until the load hangs and is controlled."""
         self.run(0.5)
         assert client.command(400, 1).result == 0, client.texts()
         assert client.command(22).result == 0, client.texts()
-        self.run_until(lambda: self.station.machine.stage is Stage.FLYING)
+        self.run_until(lambda: self.station.machine.stage is Stage.FLYING, timeout)
 
     def flown(self, seconds: float) -> swing.Flown:
         """The last part of the flight, by the plant's truth."""
