@@ -155,3 +155,5 @@ def _loop(
             guided.exchange(now, heard=received is not None)
             for datagram in guided.to_plant(now):
                 link.send(datagram)
+            if guided.shut_down:
+                stop.reason = "a client's command to shut down"

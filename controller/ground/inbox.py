@@ -10,11 +10,12 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import WARNING, Notice
 from controller.ground.commands.service import CommandService
-from controller.ground.commands.setpoints import attitude_setpoint_of, setpoint_of
+from controller.ground.commands.setpoints import OFFSET_FRAMES, Anchor, attitude_setpoint_of, setpoint_of
 from controller.ground.files.ftp import Client as FtpClient
 from controller.ground.files.ftp import Ftp
 from controller.ground.files.logs import MESSAGES as LOG_MESSAGES
 from controller.ground.files.logs import LogProtocol
+from controller.ground.flight.geometry import hanging_load
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.sticks import axes_of
 from controller.ground.link.outbox import Outbox
@@ -24,12 +25,15 @@ from controller.ground.missions import transfer as mission_protocol
 from controller.ground.missions.transfer import Client, Missions
 from controller.ground.parameters.protocol import HASH_CHECK, Parameters
 from controller.ground.telemetry import messages as telemetry
-from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned
+from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned, euler_from_quaternion
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
 
 _MISSION_COMPONENTS = (0, COMPONENT_AUTOPILOT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 _BROADCAST = 0
+_SAME_PLACE = 10
+"""Degrees times 1e7 between two places that count as one, 0.1 m"""
+_NO_SHELL = b"no shell here; use parameters and commands\n"
 _NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
     mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
@@ -155,7 +159,12 @@ class Inbox:
             self._out.say_seldom(peer, "Set-point denied: no position yet; start the plant", now)
             return
         home = self._machine.home or (0.0, 0.0, 0.0)
-        found = setpoint_of(message, to_load, self._profile, home, view)
+        here = hanging_load(view, self._profile) if to_load else view.position
+        anchor = Anchor(here, euler_from_quaternion(view.attitude)[2])
+        if message.coordinate_frame in OFFSET_FRAMES and hasattr(message, "x"):
+            timeout = self._machine.parameters["COM_OF_LOSS_T"]
+            anchor = self._machine.offboard.anchor(message, anchor, now, timeout)
+        found = setpoint_of(message, to_load, self._profile, home, anchor, view)
         sender = (peer.address, frame.system, frame.component)
         fault = found if isinstance(found, str) else self._machine.offer(found, sender, now)
         if fault:
@@ -199,6 +208,26 @@ class Inbox:
             ping = mavlink.MAVLink_ping_message
             self._out.send(peer, ping(message.time_usec, message.seq, frame.system, frame.component), now)
 
+    def _origin(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        """SET_GPS_GLOBAL_ORIGIN: the origin is the description's home, and says so."""
+        if message.target_system in (_BROADCAST, self._profile.system):
+            place = (message.latitude, message.longitude)
+            answer = telemetry.global_origin(self._machine)
+            if math.dist(place, (answer.latitude, answer.longitude)) > _SAME_PLACE:
+                text = "Origin denied: it is the vehicle's [home] from its description"
+                self._out.say_seldom(peer, text, now)
+            self._out.send(peer, answer, now)
+
+    def _shell(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+        """SERIAL_CONTROL: there is no shell, which a line in it says."""
+        if message.flags & mavlink.SERIAL_CONTROL_FLAG_REPLY or not message.count:
+            return
+        data = _NO_SHELL.ljust(70, b"\0")
+        reply = mavlink.MAVLink_serial_control_message(
+            message.device, mavlink.SERIAL_CONTROL_FLAG_REPLY, 0, 0, len(_NO_SHELL), list(data)
+        )
+        self._out.send(peer, reply, now)
+
     def _time_sync(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if message.tc1 == 0:
             # On the clock of the telemetry's time stamps, so that a companion knows the age of a state.
@@ -237,6 +266,8 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: Inbox._sticks,
     mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Inbox._data_stream,
     mavlink.MAVLINK_MSG_ID_PING: Inbox._ping,
+    mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: Inbox._origin,
+    mavlink.MAVLINK_MSG_ID_SERIAL_CONTROL: Inbox._shell,
     **dict.fromkeys(LOG_MESSAGES, Inbox._log),
     mavlink.MAVLINK_MSG_ID_TIMESYNC: Inbox._time_sync,
     mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: Inbox._file_transfer,

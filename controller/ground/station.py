@@ -20,6 +20,7 @@ from controller.ground.flight.modes import Machine
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.setpoint_types import Target
 from controller.ground.inbox import Inbox
+from controller.ground.link.datagrams import DatagramSplitter
 from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import CurrentMode, Packed, decoded, packed
 from controller.ground.link.peers import Address, Peers
@@ -32,8 +33,9 @@ from controller.ground.parameters.storage import StoredParameters
 from controller.ground.parameters.table import BY_NAME
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.load_relay import LoadRelay
+from controller.ground.telemetry.message_rates import Streams
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
-from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame, split
+from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame
 
 STATION_LINK, ONBOARD_LINK = 0, 1
 GUIDANCE_PERIOD = 0.02
@@ -91,6 +93,7 @@ class Station:
         self.missions = Missions(self.machine.accept_plan)
         standard = standard_peers(profile.instance) if peers is None else peers
         self.peers = Peers(standard, now, self._forget)
+        self.datagrams = DatagramSplitter()
         self.dropped = 0
         """Datagrams and frames that were not taken"""
         self._signing = signing
@@ -125,7 +128,7 @@ class Station:
 
     def receive(self, datagram: bytes, address: Address, now: float) -> None:
         """A datagram from a peer. Never raises, whatever is in it."""
-        for frame in split(datagram[:0xFFFF]).frames:
+        for frame in self.datagrams.frames(datagram, address):
             self.receive_frame(frame, address, now)
 
     def receive_frame(self, frame: Frame, address: Address, now: float) -> None:
@@ -184,6 +187,7 @@ class Station:
             return machine.target
         self._stirred = False
         self._next_look = (view.time + GUIDANCE_PERIOD, now + GUIDANCE_PERIOD)
+        self._restart_if_asked(now)
         target = machine.update(view, now, self.peers.last_station)
         self._hasten_state(now)
         if machine.notices:
@@ -196,6 +200,18 @@ class Station:
             for seq in reached:
                 self._out.broadcast(mavlink.MAVLink_mission_item_reached_message(seq), now)
         return target
+
+    @property
+    def shut_down(self) -> bool:
+        """Whether a client has asked for the end of the process."""
+        return self._commands.restart == "shut down" and not self.machine.armed
+
+    def _restart_if_asked(self, now: float) -> None:
+        if self._commands.restart == "reboot":
+            self._commands.restart = ""
+            self.machine.restart()
+            for peer in self.peers:
+                peer.streams = Streams(now)
 
     def _state(self) -> tuple[bool, Mode, Stage]:
         return self.machine.armed, self.machine.mode, self.machine.stage

@@ -49,6 +49,11 @@ class Guided:
         """When ground control wants attention, if the plant says nothing before."""
         return min(self._link.station.next_deadline(now), now + LONGEST_WAIT)
 
+    @property
+    def shut_down(self) -> bool:
+        """Whether a client has asked for the end of the process."""
+        return self._link.station.shut_down
+
     def to_plant(self, now: float) -> list[bytes]:
         """Datagrams for the plant: commands of ground control that are for it to carry out."""
         messages = self._link.station.plant_commands.to_plant(now)

@@ -231,14 +231,6 @@ def test_intervals() -> None:
         assert client.command(511, *bad).result == DENIED
 
 
-def test_home_cannot_be_set_and_the_reason_is_said() -> None:
-    rig = Rig()
-    client = rig.client()
-    rig.run(0.1)
-    assert client.command(179, 0, 0, 0, 0, 47.0, 8.0, 400).result == DENIED
-    assert "Home cannot be set" in client.texts()[0]
-
-
 def test_pings_time_and_ftp() -> None:
     rig = Rig()
     client = rig.client()

@@ -104,10 +104,9 @@ def test_a_set_point_of_the_load_is_the_loads() -> None:
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        (local_setpoint(0, 0, -5, mask=0b111111111111), "without position or velocity"),
-        (local_setpoint(0, 0, -5, mask=0b110000111111, afx=1.0), "without position or velocity"),
+        (local_setpoint(0, 0, -5, mask=0b111111111111), "asks for nothing"),
         (local_setpoint(math.inf, 0, -5), "beyond all bounds"),
-        (local_setpoint(0, 0, -5, frame=9), "body's frame|frame 9"),
+        (local_setpoint(0, 0, -5, frame=2), "frame 2"),
         (local_setpoint(9000, 0, -5), "GF_MAX_HOR_DIST"),
     ],
 )
@@ -125,6 +124,55 @@ def test_set_points_that_move_outside_the_fence_are_refused_in_a_word_now_and_th
         client.send(local_setpoint(600 + metres, 0, -5))
         rig.run(0.1)
     assert 4 <= len(client.texts()) - before <= 6  # one in TEXT_PAUSE
+
+
+@pytest.mark.parametrize(("frame", "turned"), [(7, False), (8, True), (9, True), (12, True)])
+def test_a_position_in_an_offset_frame_counts_from_where_its_first_message_came(
+    frame: int, turned: bool
+) -> None:
+    rig, client = flying()
+    stream(rig, client, local_setpoint(0, 0, -5), 0.3)
+    client.command(176, 1, 6, 0)
+    stream(rig, client, local_setpoint(0, 0, -5, yaw=0.5), 6.0)
+    place = rig.view.position
+    yaw = math.pi / 2 - 0.5
+    for _ in range(2):  # repeated, it is the same point; another offset begins anew
+        stream(rig, client, local_setpoint(4, 0, -1, frame=frame, yaw=0.5), 8.0)
+        forward = (math.cos(yaw), math.sin(yaw)) if turned else (0.0, 1.0)
+        expected = (place[0] + 4 * forward[0], place[1] + 4 * forward[1], place[2] + 1)
+        assert rig.view.position == pytest.approx(expected, abs=0.05)
+        stream(rig, client, local_setpoint(0, 0, 0, frame=frame, yaw=0.5), 0.2)
+        place = rig.view.position
+
+
+def test_an_acceleration_alone_drives_the_velocity_up_to_the_limit() -> None:
+    rig, client = flying()
+    message = local_setpoint(0, 0, 0, mask=0b110000111111, afx=1.0)
+    stream(rig, client, message, 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, message, 2.0)
+    assert isinstance(rig.target, Follow)
+    assert rig.target.velocity == pytest.approx((0.0, 2.0, 0.0), abs=0.15)  # 1 m/s² north for 2 s
+    assert rig.target.acceleration == pytest.approx((0.0, 1.0, 0.0))
+    stream(rig, client, message, 8.0)
+    assert rig.target.velocity[1] == pytest.approx(6.0)  # MPC_XY_VEL_MAX
+    back = local_setpoint(0, 0, 0, mask=0b110000111111, afx=-1.0)
+    stream(rig, client, back, 1.0)
+    assert rig.target.velocity[1] == pytest.approx(5.0, abs=0.15)  # it was not wound up
+
+
+def test_a_yaw_rate_alone_turns_where_the_vehicle_is() -> None:
+    rig, client = flying()
+    rig.run(3.0)
+    place = rig.view.position
+    message = local_setpoint(0, 0, 0, mask=0b010111111111, yaw_rate=0.3)
+    stream(rig, client, message, 0.3)
+    assert client.command(176, 1, 6, 0).result == ACCEPTED
+    stream(rig, client, message, 3.0)
+    assert isinstance(rig.target, Follow)
+    assert rig.target.yaw_rate == pytest.approx(-0.3)
+    assert rig.target.velocity == (0.0, 0.0, 0.0)
+    assert rig.view.position == pytest.approx(place, abs=0.01)
 
 
 def test_one_client_at_a_time_has_offboard_control() -> None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.commands.result import OK, UNSUPPORTED, Verdict, deny, not_now
+from controller.ground.commands.result import OK, UNSUPPORTED, UNSUPPORTED_FRAME, Verdict, deny, not_now
 from controller.ground.flight.geometry import filled
 from controller.ground.flight.modes import Machine, Reposition
 from controller.ground.flight.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
@@ -18,6 +18,9 @@ from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple, yaw_from_headin
 
 FORCE = 21196.0
 """param2 of an arm or disarm command that is meant in any case"""
+_SHUTDOWN = 2.0
+_REBOOTS = (0.0, 1.0, _SHUTDOWN, 3.0)
+"""PREFLIGHT_REBOOT_SHUTDOWN's param1; 3 would stay in a boot loader, which there is none of"""
 DEFAULT_RADIUS = 10.0
 """m, of an orbit or figure of eight that says none"""
 MEMORY = 5.0
@@ -98,6 +101,9 @@ class Requests(Protocol):
     def inject_failure(self, parameters: tuple[float, ...]) -> None:
         """Pass MAV_CMD_INJECT_FAILURE on to the plant; its answer is the command's."""
 
+    def restart(self, shut_down: bool) -> None:
+        """Begin afresh, or end, once the acknowledgement is out."""
+
     def say(self, text: str) -> None:
         """A STATUSTEXT that comes with an acceptance."""
 
@@ -164,6 +170,9 @@ def execute(command: Command, machine: Machine, requests: Requests, now: float) 
         return Verdict(UNSUPPORTED, f"Command {command.number} ({name}) is not supported")
     if command.to_load and command.number not in _FOR_LOAD:
         return Verdict(UNSUPPORTED, f"Command {command.number} is not the load's; address the vehicle")
+    placed = command.number in _WITH_PLACE and any(not math.isnan(p) for p in command[5:8])
+    if placed and command.frame_fault:
+        return Verdict(UNSUPPORTED_FRAME, f"Command denied: {command.frame_fault}")
     return handler(command, machine, requests, now)
 
 
@@ -175,8 +184,6 @@ def _arm(c: Command, machine: Machine, requests: Requests, now: float) -> Verdic
 
 
 def _takeoff(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    if c.frame_fault and not math.isnan(c.p7):
-        return deny(f"Take-off denied: {c.frame_fault}")
     return machine.takeoff(_height(c, machine))
 
 
@@ -203,8 +210,6 @@ def _mode(mode: Mode) -> _Handler:
 
 
 def _reposition(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    if c.frame_fault and not math.isnan(c.p7):
-        return deny(f"Reposition denied: {c.frame_fault}")
     if math.isnan(c.p5) != math.isnan(c.p6):
         return deny("Reposition denied: latitude without longitude; send both or neither")
     if abs(c.p5) > 90 or abs(c.p6) > 180:
@@ -252,8 +257,6 @@ def _figure_eight(c: Command, machine: Machine, requests: Requests, now: float) 
 
 def _centre(c: Command, machine: Machine, name: str) -> Triple | Verdict:
     """Of a pattern, m ENU of the vehicle; what is NaN is where the vehicle is."""
-    if c.frame_fault and not math.isnan(c.p7):
-        return deny(f"{name} denied: {c.frame_fault}")
     if math.isnan(c.p5) != math.isnan(c.p6):
         return deny(f"{name} denied: latitude without longitude; send both or neither")
     if abs(c.p5) > 90 or abs(c.p6) > 180 or math.isinf(c.p7):
@@ -300,7 +303,14 @@ def _set_item(c: Command, machine: Machine, requests: Requests, now: float) -> V
 
 
 def _set_home(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    return deny("Home cannot be set: it is where the vehicle was armed; land and arm where you want it")
+    if machine.view is None:
+        return not_now("Home denied: no position yet; start the plant")
+    if c.p1 == 1.0:
+        return machine.set_home_to(machine.view.position)
+    if not (abs(c.p5) <= 90 and abs(c.p6) <= 180) or math.isinf(c.p7):
+        return deny(f"Home denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is no place; use degrees, or param1 = 1")
+    east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, machine.profile.origin.home.altitude))
+    return machine.set_home_to((east, north, _height(c, machine)))
 
 
 def _terminate(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -345,13 +355,31 @@ def _storage(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
 
 
 def _reboot(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    if c.p1 not in _REBOOTS:
+        return deny(f"Reboot denied: param1 is {c.p1:g}; use 0 (nothing), 1 (reboot) or 2 (shut down)")
     if c.p1 == 0.0:
         return OK
-    return not_now("Reboot denied: stop and start the controller's process instead")
+    if machine.armed:
+        return not_now("Reboot denied: armed; land and disarm first")
+    requests.restart(shut_down=c.p1 == _SHUTDOWN)
+    return OK
 
 
 def _calibrate(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    return deny("Calibration denied: simulated sensors need none")
+    """Simulated sensors need none: each is done at once, in the words that clients wait for."""
+    if machine.armed:
+        return not_now("Calibration denied: armed; disarm first")
+    for asked, name in (
+        (c.p1 == 1.0, "gyro"),
+        (c.p2 == 1.0, "mag"),
+        (c.p3 == 1.0, "baro"),
+        (c.p5 in (1.0, 4.0), "accel"),
+        (c.p5 == 2.0, "level"),
+    ):
+        if asked:
+            for text in (f"calibration started: 2 {name}", "progress <100>", f"calibration done: {name}"):
+                requests.say(f"[cal] {text}")
+    return OK
 
 
 def _inject_failure(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict | None:

@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import common as mavlink
 ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 REJECTED_FOR_NOW: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 DENIED: int = mavlink.MAV_RESULT_DENIED
+UNSUPPORTED_FRAME = 9
+"""MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME of the current `common` dialect"""
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED
 
 EMERGENCY: int = mavlink.MAV_SEVERITY_EMERGENCY

@@ -44,6 +44,8 @@ class CommandService:
         self.build = build
         self._show_state = show_state
         self._memory = Memory()
+        self.restart = ""
+        """What a client asked for: "reboot", "shut down", or nothing"""
         self._under_way: set[Hashable] = set()
         """Commands whose verdict is still to come"""
 
@@ -135,6 +137,10 @@ class _PeerRequests(Requests):
     def inject_failure(self, parameters: tuple[float, ...]) -> None:
         """Pass MAV_CMD_INJECT_FAILURE on to the plant."""
         self._service.plant.inject_failure(parameters, self._now, self._finish)
+
+    def restart(self, shut_down: bool) -> None:
+        """Begin afresh, or end, once the acknowledgement is out."""
+        self._service.restart = "shut down" if shut_down else "reboot"
 
     def say(self, text: str) -> None:
         """A STATUSTEXT that comes with an acceptance."""

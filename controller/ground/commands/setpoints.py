@@ -25,7 +25,8 @@ _POSITION, _VELOCITY, _ACCELERATION = 0, 3, 6
 _LARGEST_RATE = 100.0
 """rad/s"""
 _FORCE, _NO_YAW, _NO_YAW_RATE = 1 << 9, 1 << 10, 1 << 11
-_BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_FRD)
+_BODY_FRAMES = (mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD)
+OFFSET_FRAMES = (mavlink.MAV_FRAME_LOCAL_OFFSET_NED, *_BODY_FRAMES)
 _AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 _RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 
@@ -42,8 +43,17 @@ class Setpoint(NamedTuple):
     yaw_rate: float
 
 
+class Anchor(NamedTuple):
+    """What positions of offset and body frames count from."""
+
+    position: Triple
+    """m ENU, of the body that is steered"""
+    yaw: float
+    """rad ENU"""
+
+
 def setpoint_of(
-    message: Any, of_load: bool, profile: Profile, home: Triple, view: VehicleView
+    message: Any, of_load: bool, profile: Profile, home: Triple, anchor: Anchor, view: VehicleView
 ) -> Setpoint | str:
     """The set-point of SET_POSITION_TARGET_LOCAL_NED or _GLOBAL_INT, or why it cannot be flown."""
     mask = message.type_mask
@@ -54,14 +64,16 @@ def setpoint_of(
     if message.id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT:
         found = _global_position(message, mask, profile, home)
     else:
-        found = _local_position(message, mask)
+        found = _local_position(message, mask, anchor)
     if isinstance(found, str):
         return found
     if (
         message.coordinate_frame in _BODY_FRAMES
         and message.id == mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
     ):
-        velocity, acceleration = (_from_heading_frame(v, view) for v in (velocity, acceleration))
+        velocity, acceleration = (
+            _from_heading_frame(v, euler_from_quaternion(view.attitude)[2]) for v in (velocity, acceleration)
+        )
     else:
         velocity, acceleration = enu_to_ned(velocity), enu_to_ned(acceleration)
     heading = math.nan if mask & _NO_YAW else message.yaw
@@ -69,8 +81,14 @@ def setpoint_of(
     numbers = (*found, *velocity, *acceleration, heading, turn)
     if any(math.isinf(number) or abs(number) > 1e6 for number in numbers):
         return "Set-point with a number beyond all bounds; mask what is not meant"
-    if any(math.isnan(p) and math.isnan(v) for p, v in zip(found, velocity, strict=True)):
-        return "Set-point without position or velocity on some axis; unmask one of them on each"
+    if all(math.isnan(number) for number in numbers):
+        return "Set-point that asks for nothing; unmask what is meant"
+    # As on PX4, what is asked for on some axes only leaves the others where they are.
+    x, y, z = (
+        0.0 if all(math.isnan(n) for n in axis) else axis[1]
+        for axis in zip(found, velocity, acceleration, strict=True)
+    )
+    velocity = (x, y, z)
     yaw = math.nan if math.isnan(heading) else yaw_from_heading(heading)
     return Setpoint(of_load, found, velocity, acceleration, yaw, -turn)
 
@@ -104,16 +122,19 @@ def _unmasked(values: Triple, mask: int, shift: int) -> Triple:
     return (x, y, z)
 
 
-def _local_position(message: Any, mask: int) -> Triple | str:
+def _local_position(message: Any, mask: int, anchor: Anchor) -> Triple | str:
     position = _unmasked((message.x, message.y, message.z), mask, _POSITION)
-    if message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED:
+    frame = message.coordinate_frame
+    if frame == mavlink.MAV_FRAME_LOCAL_NED:
         return enu_to_ned(position)
-    if message.coordinate_frame not in _BODY_FRAMES:
-        frame = f"Set-points in frame {message.coordinate_frame}"
-        return f"{frame} are not supported; use 1 (local NED) or 8 (body, velocity)"
-    if any(not math.isnan(number) for number in position):
-        return "Positions in the body's frame are not supported; send velocity, or use frame 1 (local NED)"
-    return NOTHING
+    if frame in _BODY_FRAMES:
+        offset = _from_heading_frame(position, anchor.yaw)
+    elif frame == mavlink.MAV_FRAME_LOCAL_OFFSET_NED:
+        offset = enu_to_ned(position)
+    else:
+        return f"Set-points in frame {frame} are not supported; use 1 (local), 7 (offset), 8, 9 or 12 (body)"
+    x, y, z = (p + d for p, d in zip(anchor.position, offset, strict=True))
+    return (x, y, z)
 
 
 def _global_position(message: Any, mask: int, profile: Profile, home: Triple) -> Triple | str:
@@ -131,9 +152,10 @@ def _global_position(message: Any, mask: int, profile: Profile, home: Triple) ->
     return (math.nan if east_masked else east, math.nan if north_masked else north, up)
 
 
-def _from_heading_frame(v: Triple, view: VehicleView) -> Triple:
-    """Forward, right, down by the vehicle's heading, level: to ENU."""
-    yaw = euler_from_quaternion(view.attitude)[2]
+def _from_heading_frame(v: Triple, yaw: float) -> Triple:
+    """Forward, right, down by a heading, level: to ENU; NaN beside a number counts as 0."""
+    if not (math.isnan(v[0]) and math.isnan(v[1])):
+        v = (0.0 if math.isnan(v[0]) else v[0], 0.0 if math.isnan(v[1]) else v[1], v[2])
     c, s = math.cos(yaw), math.sin(yaw)
     return (v[0] * c + v[1] * s, v[0] * s - v[1] * c, -v[2])
 
@@ -145,6 +167,9 @@ class Offboard:
         self.latest: Setpoint | Attitude | None = None
         self._time = -math.inf
         self._sender: object = None
+        self._anchor: Anchor | None = None
+        self._offset: object = None
+        """Of the last message in an offset frame"""
 
     def offer(self, setpoint: Setpoint | Attitude, sender: object, now: float, timeout: float) -> str:
         """Take a set-point; returns why not, or an empty string."""
@@ -152,6 +177,13 @@ class Offboard:
             return "Another client has offboard control; stop its set-points first"
         self.latest, self._time, self._sender = setpoint, now, sender
         return ""
+
+    def anchor(self, message: Any, here: Anchor, now: float, timeout: float) -> Anchor:
+        """What an offset counts from: where its first message came, for as long as it is repeated."""
+        offset = (message.coordinate_frame, message.type_mask, message.x, message.y, message.z)
+        if self._anchor is None or offset != self._offset or not self.fresh(now, timeout):
+            self._anchor, self._offset = here, offset
+        return self._anchor
 
     def fresh(self, now: float, timeout: float) -> bool:
         """Whether a set-point came within the last `timeout` seconds."""

@@ -42,6 +42,8 @@ _AT_FLOOR = 0.01
 """m, by which a set-point's height may be below the floor without a word"""
 _LIFTING = 0.5
 """Share of the hover thrust below which a vehicle on the ground stays there"""
+_LONGEST_DRIVE = 0.2
+"""s between two looks for which an acceleration drives on"""
 _STAY_AT_FLOOR = 0.3
 """m above the room that a stop needs, within which a body that stops at the floor goes on to"""
 
@@ -91,6 +93,8 @@ class Guidance:
         self._mission = mission
         self._pilot = pilot
         self._home_load: Triple = (0.0, 0.0, 0.0)
+        self._chosen_home: tuple[float, float] | None = None
+        """m, of a home that was set by a command"""
         self._ascent: Ascent | None = None
         self._descent: Descent | None = None
         self._return: ReturnHome | None = None
@@ -102,6 +106,9 @@ class Guidance:
         self._yaw = 0.0
         self._at_floor = False
         """The offboard client asks for less height than there may be, and has been told"""
+        self._driven_speed: Triple = (math.nan, math.nan, math.nan)
+        self._driven_at = -math.inf
+        """m/s and s of the plant's time, of axes that only an acceleration drives"""
         self.pattern: Pattern | None = None
         """An orbit in ORBIT, a figure of eight in HOLD"""
         self.followed = FollowTarget()
@@ -124,8 +131,16 @@ class Guidance:
         return fence_around(self.home_or_origin, self._parameters, self._profile, with_load)
 
     def set_home(self, view: VehicleView) -> None:
-        """Home is here."""
+        """Home is here, or where somebody has put it; its height is where the vehicle is."""
         self.home, self._home_load = view.position, view.load_position
+        if self._chosen_home is not None:
+            self.set_home_to(*self._chosen_home)
+
+    def set_home_to(self, east: float, north: float) -> None:
+        """Home is at a place (m), on the ground that it was on; the load belongs there, too."""
+        self._chosen_home = (east, north)
+        self.home = (east, north, self.home_or_origin[2])
+        self._home_load = (east, north, self._home_load[2])
 
     def _set_home_below(self, view: VehicleView) -> None:
         """Home is on the ground under a vehicle that was found in the air."""
@@ -411,6 +426,7 @@ class Guidance:
             x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
             position = (x, y, z)
         acceleration = asked.acceleration
+        velocity = self._driven(position, velocity, acceleration, view)
         if math.isnan(position[2]):
             deep = self._goes_too_deep(velocity[2], view)
         else:
@@ -425,6 +441,22 @@ class Guidance:
             self._stay_at(position, body)
             return Goto(body, position, self._yaw, self._parameters["MPC_XY_VEL_MAX"])
         return Follow(body, position, velocity, acceleration, asked.yaw, asked.yaw_rate)
+
+    def _driven(self, position: Triple, velocity: Triple, acceleration: Triple, view: VehicleView) -> Triple:
+        """Velocities, also on axes that only have an acceleration: what there was, driven on by it."""
+        own = view.load_velocity if view.load_attached else view.velocity
+        step = view.time - self._driven_at
+        before = self._driven_speed if 0.0 <= step <= _LONGEST_DRIVE else (math.nan,) * 3
+        step = min(max(step, 0.0), _LONGEST_DRIVE)
+        driven = []
+        for p, v, a, last, now in zip(position, velocity, acceleration, before, own, strict=True):
+            alone = math.isnan(p) and math.isnan(v) and not math.isnan(a)
+            driven.append((now if math.isnan(last) else last + a * step) if alone else math.nan)
+        x, y, z = (v if math.isnan(d) else d for v, d in zip(velocity, driven, strict=True))
+        limited = limited_velocity((x, y, z), self._parameters)
+        a, b, c = (math.nan if math.isnan(d) else v for d, v in zip(driven, limited, strict=True))
+        self._driven_speed, self._driven_at = (a, b, c), view.time
+        return limited
 
     def _height(self, view: VehicleView) -> float:
         """Of the controlled body, m ENU."""

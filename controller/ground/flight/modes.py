@@ -31,6 +31,8 @@ _REACTION_MODES = {Reaction.HOLD: Mode.HOLD, Reaction.RETURN: Mode.RTL, Reaction
 _SEVERITY_OF_MODE = {mode: reaction for reaction, mode in _REACTION_MODES.items()}
 
 
+_SAME_HEIGHT = 1.0
+"""m, by which the altitude of a home may differ from the ground's without a word"""
 _LIFTS = 0.3
 """m, above a vehicle on the ground, from which on a set-point asks for a take-off"""
 
@@ -128,6 +130,26 @@ class Machine:
         self._armed_at, self._armed_at_view = now, view.time
         self.failsafes.reset()
         self._guidance.begin(view)
+
+    def set_home_to(self, place: Triple) -> Verdict:
+        """Home, to which Return goes, is elsewhere (m ENU); its height stays the ground's."""
+        if self.home is None:
+            return not_now("Home denied: no position yet; start the plant")
+        if not math.isnan(place[2]) and abs(place[2] - self.home[2]) > _SAME_HEIGHT:
+            self.say(INFO, "Home's altitude stays that of the ground where the vehicle was armed")
+        self._guidance.set_home_to(place[0], place[1])
+        return OK
+
+    def restart(self) -> None:
+        """As after a reboot: parameters and mission stay, all else is as at the start. Disarmed only."""
+        self.offboard, self.sticks = Offboard(), Sticks()
+        self.failsafes.reset()
+        self.terminated = False
+        self.mode = Mode.HOLD
+        self.target = Idle(False)
+        self._guidance = Guidance(self.profile, self.parameters, self.mission, self)
+        self.mission.replace(self.mission.items)
+        self.say(INFO, "Rebooted")
 
     def disarm(self, force: bool) -> Verdict:
         """Disarm: on the ground, or anywhere by force."""

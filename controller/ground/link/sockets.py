@@ -9,7 +9,7 @@ from collections import deque
 
 from controller.ground.link.peers import Address
 from controller.ground.station import Station
-from sitl_bridge.mavlink.framing import Frame, split
+from sitl_bridge.mavlink.framing import Frame
 
 MOST_DATAGRAMS = 8
 """Datagrams read from a link in one exchange"""
@@ -69,7 +69,7 @@ class GroundSockets:
                 except OSError:
                     continue  # the peer of an earlier datagram is gone
                 address = Address(index, host, port)
-                waiting.extend((frame, address) for frame in split(datagram).frames)
+                waiting.extend((frame, address) for frame in station.datagrams.frames(datagram, address))
             else:
                 return
 

@@ -437,12 +437,21 @@ def build(message_id: int, machine: Machine) -> Any:
         kind = ComponentMetadata if message_id == ComponentMetadata.id else ComponentInformation
         time = 0 if machine.view is None else _milliseconds(machine.view)
         return kind(time, metadata.general_crc(), metadata.uri(metadata.GENERAL))
+    if message_id == mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN:
+        return global_origin(machine)
     if message_id == CurrentMode.id:
         return _current_mode(machine)
     if message_id == mavlink.MAVLINK_MSG_ID_MISSION_CURRENT:
         return _mission_current(machine)
     builder = BUILDERS.get(message_id)
     return builder(machine, machine.view) if builder is not None and machine.view is not None else None
+
+
+def global_origin(machine: Machine) -> Any:
+    """GPS_GLOBAL_ORIGIN: of the local frame."""
+    place = _wire_place(machine.profile.origin.home)
+    time = 0 if machine.view is None else _microseconds(machine.view)
+    return mavlink.MAVLink_gps_global_origin_message(*place, time)
 
 
 def autopilot_version(machine: Machine) -> Any:
