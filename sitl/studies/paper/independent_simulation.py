@@ -158,10 +158,16 @@ def derivative_of_position(s: Sequence[float]) -> Three:
     return u * math.cos(yaw) - v * math.sin(yaw), u * math.sin(yaw) + v * math.cos(yaw), w
 
 
-def simulate(vehicle: Vehicle, wrench: Wrench, times: Array) -> Run:
-    """Open loop: a constant wrench from the description's initial state; DOP853 at 1e-10."""
+def simulate(
+    vehicle: Vehicle, wrench: Wrench, times: Array, on_vehicle: Three = STILL, on_load: Three = STILL
+) -> Run:
+    """Open loop: a constant wrench from the description's initial state; DOP853 at 1e-10.
+
+    times: (n,) s, from 0; on_vehicle, on_load: constant external forces on top of gravity, N, ENU.
+    """
+    forces = _enu_to_ned(on_vehicle), _enu_to_ned(on_load)
     solution = solve_ivp(
-        lambda _, s: derivative(vehicle, s.tolist(), wrench),
+        lambda _, s: derivative(vehicle, s.tolist(), wrench, *forces),
         (float(times[0]), float(times[-1])),
         initial_state(vehicle),
         method="DOP853",
@@ -170,6 +176,12 @@ def simulate(vehicle: Vehicle, wrench: Wrench, times: Array) -> Run:
         atol=1e-10,
     )
     return _run(solution.t, solution.y.T, len(times))
+
+
+def _enu_to_ned(vector: Three) -> Three:
+    # Not `frames.enu_to_ned`: what checks the plant shares nothing with it.
+    east, north, up = vector
+    return north, east, -up
 
 
 def fly(vehicle: Vehicle, law: Law, times: Array) -> Run:
@@ -205,7 +217,7 @@ def fly_with_noise(vehicle: Vehicle, law: Law, force_on_load: Array, period: flo
     h = period / steps
     rows = [y.copy()]
     for k, (east, north, up) in enumerate(force_on_load.tolist()):
-        force = (north, east, -up)
+        force = _enu_to_ned((east, north, up))
         for j in range(steps):
             t = k * period + j * h
             k1 = np.array(_closed_loop(vehicle, law, t, y, force))
