@@ -88,6 +88,18 @@ def test_slack_cable_does_no_work() -> None:
     np.testing.assert_array_equal(slack.path(0.2, 0.01), cut.path(0.2, 0.01))
 
 
+def test_a_cable_whose_damper_outweighs_its_spring_does_not_push() -> None:
+    """Longer than its rest length, but closing fast: F = k_a (l - l_0) + c_a dl/dt would be negative."""
+    closing, cut = (tumbling(200.0, 30.0, 2.0, 0.7, 0.0, 3.0) for _ in range(2))
+    cut.inner[CABLE_HOLDS] = 0.0
+    for plant in (closing, cut):
+        plant.x[2] = plant.x[15] + 1.1  # the spring alone would pull with 20 N, the damper push with 90 N
+        plant.run(0.02)
+    assert np.linalg.norm(closing.x[0:3] - closing.x[13:16]) > 1.0
+    assert closing.reactions[TENSION] == 0.0
+    np.testing.assert_array_equal(closing.x, cut.x)
+
+
 @pytest.mark.parametrize("damping", [0.0, 4.0])
 def test_snatches_converge_with_the_fourth_power_of_the_step(damping: float) -> None:
     """Error of a flight with many changes between slack and taut, against one of finer steps."""

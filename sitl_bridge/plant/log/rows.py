@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.plant.physics.dynamics import pull_of
+from sitl_bridge.plant.physics.cable import span, tension_of
 from sitl_bridge.plant.physics.parameters import PARAMETERS
-from sitl_bridge.plant.physics.state import CABLE_HOLDS, COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
+from sitl_bridge.plant.physics.state import COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
 
 CHUNK_ROWS = 4096
 """Rows that are kept before they are written out."""
@@ -53,10 +53,8 @@ def fill_row(
     row[_TIME] = time_s
     for i in range(STATE_SIZE):
         row[_STATE + i] = x[i]
-    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
-    length = (ex * ex + ey * ey + ez * ez) ** 0.5
-    row[_LENGTH] = length
-    row[_TENSION] = pull_of(p, x) if inner[CABLE_HOLDS] > 0.0 else 0.0
+    _, _, _, row[_LENGTH] = span(x)
+    row[_TENSION] = tension_of(p, x, inner)
     for i in range(MOST_ROTORS):
         row[_ROTORS + i] = inner[i] if p.time_constant[i] > 0.0 else command[i]
     for i in range(6):

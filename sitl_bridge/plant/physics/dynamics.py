@@ -17,13 +17,19 @@ import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 from sitl_bridge.plant.physics.air import drag_force
-from sitl_bridge.plant.physics.cable import cable_acts, slack_or_taut, spring_force, tension
+from sitl_bridge.plant.physics.cable import (
+    break_overloaded,
+    goes_slack,
+    is_taut,
+    taut_force,
+    taut_margin_of,
+    tension_of,
+)
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle, move_anchors
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.rotors import rotor_decay, rotor_wrench, spin_up
 from sitl_bridge.plant.physics.state import (
     ANGULAR_ACCELERATION,
-    CABLE_HOLDS,
     INNER_SIZE,
     LOAD_GROUND_FORCE,
     MOST_ROTORS,
@@ -41,12 +47,12 @@ _FIRST_ANGULAR: int = ANGULAR_ACCELERATION.start
 
 
 @kernel
-def rates(
+def state_derivative(
     p: Any,
     x: Array,
     inner: Array,
     wrench: tuple[float, float, float, float],
-    acts: bool,
+    cable_taut: bool,
     force: Array,
     wind: Array,
     ground: Array,
@@ -55,9 +61,9 @@ def rates(
     """Time derivative of the state.
 
     p: parameter record; x: state (19,), see `state`; inner: inner state (35,), of which anchors are read;
-    wrench: of the rotors; acts: whether the cable exerts its force; force: (6,) external force on vehicle
-    and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (7,) or more,
-    scratch; out: (19,), written.
+    wrench: of the rotors; cable_taut: whether the cable exerts its force; force: (6,) external force on
+    vehicle and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (7,) or
+    more, scratch; out: (19,), written.
     """
     vx, vy, vz = x[3], x[4], x[5]
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
@@ -70,15 +76,10 @@ def rates(
     force_y = force[1] + 2.0 * (qy * qz - qw * qx) * thrust
     force_z = force[2] + (1.0 - 2.0 * (qx * qx + qy * qy)) * thrust
     load_x, load_y, load_z = force[3], force[4], force[5]
-    if acts:
-        # The cable: e points from the vehicle to the load.
-        ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
-        length = (ex * ex + ey * ey + ez * ez) ** 0.5
-        shrink = 1.0 / length
-        ex, ey, ez = ex * shrink, ey * shrink, ez * shrink
-        pull = spring_force(p, length, (wx - vx) * ex + (wy - vy) * ey + (wz - vz) * ez)
-        force_x, force_y, force_z = force_x + pull * ex, force_y + pull * ey, force_z + pull * ez
-        load_x, load_y, load_z = load_x - pull * ex, load_y - pull * ey, load_z - pull * ez
+    if cable_taut:
+        cx, cy, cz = taut_force(p, x)
+        force_x, force_y, force_z = force_x + cx, force_y + cy, force_z + cz
+        load_x, load_y, load_z = load_x - cx, load_y - cy, load_z - cz
     if p.has_drag:
         dx, dy, dz = drag_force(p.vehicle_drag[0], p.vehicle_drag[1], vx, vy, vz, wind[0], wind[1], wind[2])
         force_x, force_y, force_z = force_x + dx, force_y + dy, force_z + dz
@@ -116,7 +117,7 @@ def runge_kutta_4(
     p: Any,
     x: Array,
     inner: Array,
-    acts: bool,
+    cable_taut: bool,
     force: Array,
     wind: Array,
     step: float,
@@ -135,13 +136,13 @@ def runge_kutta_4(
         start, middle = rotor_wrench(p, inner), rotor_wrench(p, work[_MIDDLE])
     for i in range(STATE_SIZE):
         probe[i] = x[i]
-    # One call for all four stages, so that the compiler can put `rates` in its place.
+    # One call for all four stages, so that the compiler can put `state_derivative` in its place.
     for stage in range(4):
         rate = work[stage]
         wrench = start if stage == 0 else middle
         if stage == 3:
             wrench = end
-        rates(p, probe, inner, wrench, acts, force, wind, ground, rate)
+        state_derivative(p, probe, inner, wrench, cable_taut, force, wind, ground, rate)
         ahead = step if stage == 2 else half
         for i in range(STATE_SIZE):
             probe[i] = x[i] + ahead * rate[i]
@@ -158,7 +159,7 @@ def partial_step(
     x: Array,
     inner: Array,
     command: Array,
-    acts: bool,
+    cable_taut: bool,
     force: Array,
     wind: Array,
     step: float,
@@ -173,7 +174,7 @@ def partial_step(
     rotor_decay(p, 0.5 * step, work[_SPLIT])
     spin_up(p, inner, command, work[_SPLIT], work[_MIDDLE])
     spin_up(p, work[_MIDDLE], command, work[_SPLIT], work[_END])
-    runge_kutta_4(p, x, inner, acts, force, wind, step, work)
+    runge_kutta_4(p, x, inner, cable_taut, force, wind, step, work)
 
 
 MOST_CHANGES = 4
@@ -187,7 +188,7 @@ def split_step(
     x: Array,
     inner: Array,
     command: Array,
-    acts: bool,
+    cable_taut: bool,
     force: Array,
     wind: Array,
     step: float,
@@ -199,14 +200,14 @@ def split_step(
     The instant is found by false position (Illinois) to 1e-12 of a second, from the side past the change.
     """
     left = step
-    sign = 1.0 if acts else -1.0
+    sign = 1.0 if cable_taut else -1.0
     for _ in range(MOST_CHANGES):
         before, after = 0.0, left
         for i in range(STATE_SIZE):
             x[i] = work[_START, i]
-        value_before = sign * slack_or_taut(p, x)
-        partial_step(p, x, inner, command, acts, force, wind, left, work)
-        value_after = sign * slack_or_taut(p, x)
+        value_before = sign * taut_margin_of(p, x)
+        partial_step(p, x, inner, command, cable_taut, force, wind, left, work)
+        value_after = sign * taut_margin_of(p, x)
         if value_after > 0.0:
             break  # no change in what is left of the step: done
         for _ in range(60):
@@ -217,25 +218,25 @@ def split_step(
                 guess = before + (after - before) * value_before / (value_before - value_after)
                 if before < guess < after:
                     middle = guess
-            partial_step(p, x, inner, command, acts, force, wind, middle, work)
-            value = sign * slack_or_taut(p, x)
+            partial_step(p, x, inner, command, cable_taut, force, wind, middle, work)
+            value = sign * taut_margin_of(p, x)
             if value > 0.0:
                 before, value_before = middle, value
                 value_after *= 0.5
             else:
                 after, value_after = middle, value
                 value_before *= 0.5
-        partial_step(p, x, inner, command, acts, force, wind, after, work)
+        partial_step(p, x, inner, command, cable_taut, force, wind, after, work)
         for i in range(p.rotor_count):
             inner[i] = work[_END, i]
         for i in range(STATE_SIZE):
             work[_START, i] = x[i]
         left -= after
-        sign, acts = -sign, not acts
+        sign, cable_taut = -sign, not cable_taut
         if left <= 0.0:
             break
     else:
-        partial_step(p, x, inner, command, acts, force, wind, left, work)
+        partial_step(p, x, inner, command, cable_taut, force, wind, left, work)
     for i in range(p.rotor_count):
         inner[i] = work[_END, i]
 
@@ -246,42 +247,33 @@ def whole_step(
 ) -> None:
     """Advance state and inner state by one step, in place; the decays of half a step are in `work`."""
     work[_GROUND, LOOSE] = 0.0
-    acts = cable_acts(p, x, inner)
-    watched = inner[CABLE_HOLDS] > 0.0 and not p.two_way
+    cable_taut = is_taut(p, x, inner)
+    watched = goes_slack(p, inner)
     if watched:
         for i in range(STATE_SIZE):
             work[_START, i] = x[i]
     spin_up(p, inner, command, work[_DECAY], work[_MIDDLE])
     spin_up(p, work[_MIDDLE], command, work[_DECAY], work[_END])
-    runge_kutta_4(p, x, inner, acts, force, wind, step, work)
-    if watched and (slack_or_taut(p, x) > 0.0) != acts:
-        split_step(p, x, inner, command, acts, force, wind, step, work)
+    runge_kutta_4(p, x, inner, cable_taut, force, wind, step, work)
+    if watched and (taut_margin_of(p, x) > 0.0) != cable_taut:
+        split_step(p, x, inner, command, cable_taut, force, wind, step, work)
     else:
         for i in range(p.rotor_count):
             inner[i] = work[_END, i]
     if p.has_ground:
         move_anchors(p, x, inner, work[_GROUND, LOOSE] > 0.0)
-    if p.breaking_tension < math.inf and inner[CABLE_HOLDS] > 0.0 and pull_of(p, x) > p.breaking_tension:
-        inner[CABLE_HOLDS] = 0.0
+    if p.breaking_tension < math.inf:
+        break_overloaded(p, x, inner)
 
 
 @kernel
-def pull_of(p: Any, x: Array) -> float:
-    """Tension (N) of a cable that holds, in this state."""
-    ex, ey, ez = x[13] - x[0], x[14] - x[1], x[15] - x[2]
-    length = (ex * ex + ey * ey + ez * ez) ** 0.5
-    if length <= 0.0:
-        return 0.0
-    rate = ((x[16] - x[3]) * ex + (x[17] - x[4]) * ey + (x[18] - x[5]) * ez) / length
-    return float(tension(p, length, rate))
-
-
-@kernel
-def feel(p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array, reactions: Array) -> None:
+def fill_reactions(
+    p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array, reactions: Array
+) -> None:
     """What acts on the bodies in this state, see `state` for the elements of `reactions` (9,), written."""
     rate = work[0]
-    acts = cable_acts(p, x, inner)
-    rates(p, x, inner, rotor_wrench(p, inner), acts, force, wind, work[_GROUND], rate)
+    cable_taut = is_taut(p, x, inner)
+    state_derivative(p, x, inner, rotor_wrench(p, inner), cable_taut, force, wind, work[_GROUND], rate)
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
     ax, ay, az = rate[3], rate[4], rate[5] + p.gravity
     reactions[0] = (
@@ -295,7 +287,7 @@ def feel(p: Any, x: Array, inner: Array, force: Array, wind: Array, work: Array,
     )
     for i in range(3):
         reactions[_FIRST_ANGULAR + i] = rate[10 + i]
-    reactions[TENSION] = pull_of(p, x) if acts else 0.0
+    reactions[TENSION] = tension_of(p, x, inner)
     reactions[VEHICLE_GROUND_FORCE] = 0.0
     reactions[LOAD_GROUND_FORCE] = 0.0
     if p.has_ground:
@@ -367,9 +359,9 @@ def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -
     written. Real parts decide whether the cable is taut, so that it can be differentiated with complex
     numbers.
     """
-    acts = p.two_way or slack_or_taut(p, x.real) > 0.0
+    taut = p.two_way or taut_margin_of(p, x.real) > 0.0
     anchored = np.zeros(INNER_SIZE)
-    rates(p, x, anchored, rotor_wrench(p, rotor_speed), acts, force, np.zeros(6), np.zeros(7), out)
+    state_derivative(p, x, anchored, rotor_wrench(p, rotor_speed), taut, force, np.zeros(6), np.zeros(7), out)
 
 
 @entry_point(

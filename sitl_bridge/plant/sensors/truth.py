@@ -8,7 +8,7 @@ import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.frames import rotate_inverse
-from sitl_bridge.plant.physics.dynamics import WORK_ROWS, feel
+from sitl_bridge.plant.physics.dynamics import WORK_ROWS, fill_reactions
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.state import INNER_SIZE, REACTIONS_SIZE, STATE_SIZE, Array
 from sitl_bridge.plant.sensors.atmosphere import ZERO_CELSIUS, air_pressure, air_temperature
@@ -48,7 +48,7 @@ def measure(
     """
     p, out = parameters[0], measurements[0]
     q = (x[6], x[7], x[8], x[9])
-    feel(p, x, inner, force, wind, work, reactions)
+    fill_reactions(p, x, inner, force, wind, work, reactions)
     standing = rotate_inverse(q, (0.0, 0.0, p.gravity))
     field = rotate_inverse(q, (magnetic_field[0], magnetic_field[1], magnetic_field[2]))
     for i in range(3):
