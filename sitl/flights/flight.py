@@ -15,7 +15,14 @@ from controller.feedback.truth import estimates
 from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Pair, ProgressLine, watch
 from sitl.flights.report import OF_THE_PLANT, clear, write_report
-from sitl.flights.scenario import GroundControl, Scenario, plant_vehicle, scenario_vehicle, usual_feedback
+from sitl.flights.scenario import (
+    GroundControl,
+    Scenario,
+    plant_vehicle,
+    scenario_vehicle,
+    suited,
+    usual_feedback,
+)
 from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest
@@ -125,6 +132,8 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     """Fly; returns the summary and the output folder, where it is too. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = options.checked_vehicle()
+    for note in suited(scenario, options.vehicle, options.overrides).notes:
+        print(f"fly: {note}", file=sys.stderr, flush=True)
     options.check_port()
     if options.out is None:
         name = f"{Path(options.scenario_name).stem}-{time.strftime('%Y%m%d-%H%M%S')}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import resources
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -93,14 +93,78 @@ def load_scenario(name_or_file: str) -> Scenario:
     return validated(Scenario, content, source)
 
 
+OF_THE_VEHICLE = ("airframe.", "rotors.", "cable.", "load.", "initial.vehicle_position")
+"""Keys that say what a vehicle is, or that fit its cable: a scenario sets them for its own vehicle only."""
+HANGING_HEIGHT = 1.0
+"""m above the ground, of a load that is to hang at the start and whose description says nothing of it."""
+
+
+class Suited(NamedTuple):
+    """A scenario's overrides for one vehicle, and what was changed for it."""
+
+    overrides: list[Override]
+    plant_overrides: list[Override]
+    """Those of the plant alone."""
+    notes: list[str]
+    """One line each, for the person who flies it."""
+
+
+def suited(scenario: Scenario, vehicle: str | None, overrides: Overrides = ()) -> Suited:
+    """What a scenario sets for a vehicle (None: its own), under the overrides that a person has given.
+
+    Another vehicle keeps its own airframe, cable and load. A scenario with a reference of its own begins in
+    the air: a vehicle that is described on the ground starts in hover. Raises DescriptionError.
+    """
+    common, plant_only = _entries("set", scenario.set), _entries("plant_set", scenario.plant_set)
+    notes: list[str] = []
+    name = vehicle or scenario.vehicle
+    if name != scenario.vehicle:
+        left_out = [entry.text for entry in (*common, *plant_only) if _key(entry).startswith(OF_THE_VEHICLE)]
+        common, plant_only = (
+            [entry for entry in entries if not _key(entry).startswith(OF_THE_VEHICLE)]
+            for entries in (common, plant_only)
+        )
+        if left_out:
+            notes.append(f"{', '.join(left_out)} is for {scenario.vehicle} only: {name} keeps its own")
+    if not isinstance(scenario.reference, GroundControl):
+        described = load_vehicle(name, [*common, *overrides])
+        asked = any(_key(entry) == "initial.start" for entry in overrides)
+        if described.initial.start == "ground" and not asked:
+            hanging = _hanging(described)
+            common = [*common, *(Override(text, "scenario: start in the air") for text in hanging)]
+            notes.append(
+                f"{name} starts in hover, its load at {_place(hanging)} m: the scenario has no take-off"
+            )
+    return Suited(common, plant_only, notes)
+
+
 def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
-    """The scenario's vehicle, with what the command line says on top."""
-    return load_vehicle(vehicle or scenario.vehicle, [*_entries("set", scenario.set), *overrides])
+    """The scenario's vehicle, or another one, with what the command line says on top."""
+    found = suited(scenario, vehicle, overrides)
+    return load_vehicle(vehicle or scenario.vehicle, [*found.overrides, *overrides])
 
 
 def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
     """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
-    return scenario_vehicle(scenario, vehicle, [*_entries("plant_set", scenario.plant_set), *overrides])
+    found = suited(scenario, vehicle, overrides)
+    entries = [*found.overrides, *found.plant_overrides, *overrides]
+    return load_vehicle(vehicle or scenario.vehicle, entries)
+
+
+def _hanging(vehicle: Vehicle) -> list[str]:
+    """Overrides that let a vehicle hover with its load above the origin, as high as it is described."""
+    ground = 0.0 if vehicle.ground is None else vehicle.ground.height
+    height = max(vehicle.initial.load_position[2], ground + vehicle.load.radius + HANGING_HEIGHT)
+    return ["initial.start=hover", f"initial.load_position=[0.0, 0.0, {height!r}]"]
+
+
+def _place(overrides: Sequence[str]) -> str:
+    return overrides[-1].partition("=")[2]
+
+
+def _key(entry: str | Override) -> str:
+    text = entry.text if isinstance(entry, Override) else entry
+    return text.partition("=")[0].strip()
 
 
 def _entries(key: str, texts: Sequence[str]) -> list[Override]:

@@ -1,0 +1,71 @@
+"""Scenarios suit the vehicle that flies them: each one flies each shipped vehicle, and one's own."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sitl.flights.free_ports import free_ports
+from sitl.flights.report import read_state_log
+from sitl.flights.scenario import (
+    GroundControl,
+    load_scenario,
+    plant_vehicle,
+    scenario_names,
+    scenario_vehicle,
+    suited,
+)
+from sitl_bridge.vehicle.files import load_vehicle, vehicle_names
+
+FLOWN = [name for name in scenario_names() if not isinstance(load_scenario(name).reference, GroundControl)]
+
+
+def test_a_scenarios_cable_is_for_its_own_vehicle() -> None:
+    scenario = load_scenario("setpoint")
+    assert scenario_vehicle(scenario, None, []).cable.rest_length == 10.0
+    assert scenario_vehicle(scenario, "paper", []).cable.rest_length == 10.0
+    other = suited(scenario, "heavy")
+    assert scenario_vehicle(scenario, "heavy", []).cable == load_vehicle("heavy").cable
+    assert "cable.rest_length=10 is for paper only" in other.notes[0]
+    assert not suited(scenario, "paper").notes
+
+
+def test_what_a_scenario_sets_of_its_surroundings_is_for_every_vehicle() -> None:
+    scenario = load_scenario("baro-drift")
+    assert plant_vehicle(scenario, "heavy", []).sensors.barometer.random_walk == 0.3
+    assert scenario_vehicle(scenario, "heavy", []).initial.load_position == (0.0, 0.0, 20.0)
+
+
+def test_a_vehicle_on_the_ground_starts_in_hover_and_that_is_said() -> None:
+    found = suited(load_scenario("setpoint"), "iris")
+    vehicle = scenario_vehicle(load_scenario("setpoint"), "iris", [])
+    assert vehicle.initial.start == "hover"
+    assert vehicle.initial_load_position[2] >= 1.0
+    assert any("starts in hover" in note for note in found.notes)
+
+
+def test_who_asks_for_the_ground_gets_it() -> None:
+    overrides = ["initial.start=ground"]
+    assert scenario_vehicle(load_scenario("setpoint"), "iris", overrides).initial.start == "ground"
+    assert scenario_vehicle(load_scenario("hold"), None, []).initial.start == "ground"
+
+
+@pytest.mark.parametrize("vehicle", vehicle_names())
+@pytest.mark.parametrize("scenario", FLOWN)
+def test_every_scenario_flies_every_vehicle(scenario: str, vehicle: str, tmp_path: Path) -> None:
+    """Upright, in the air, and within metres of where it is to be."""
+    [port] = free_ports(1)
+    command = [sys.executable, "-m", "sitl", "fly", scenario, "--vehicle", vehicle, "--clock", "lockstep"]
+    command += ["--hil", f"udpout:127.0.0.1:{port}", "--duration", "12", "--out", str(tmp_path), "--json"]
+    flight = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
+    summary = json.loads(flight.stdout)
+    assert summary["completed"], flight.stderr
+    log = read_state_log(tmp_path / "state.parquet")
+    upright = 1.0 - 2.0 * (log["attitude_qx"] ** 2 + log["attitude_qy"] ** 2)
+    assert np.degrees(np.arccos(upright.min())) < 50.0
+    assert summary["largest_error_at_end_m"] < 3.0
