@@ -55,6 +55,19 @@ def test_each_sensor_is_a_precondition(sensor: str) -> None:
     assert client.command(400, 1).result == ACCEPTED
 
 
+def test_there_is_no_home_before_arming_would_be_accepted() -> None:
+    """MAVSDK's examples wait for a global position and a home, and arm at once."""
+    rig = Rig()
+    client = rig.client()
+    rig.view.health.load = False
+    rig.run(3.0)
+    assert client.got("HOME_POSITION") == []
+    rig.view.health.load = True
+    rig.run(3.0)
+    assert client.got("HOME_POSITION")
+    assert client.command(400, 1).result == ACCEPTED
+
+
 def test_before_the_first_sensor_data() -> None:
     rig = Rig()
     client = rig.client()

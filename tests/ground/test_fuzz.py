@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import random
 import struct
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.packing import frame
+from controller.pilot.log_folder import LogFolder
 from tests.ground.rig import NAN, Channel, Rig
 
 SPICE = [NAN, float("inf"), float("-inf"), -1.0, 0.0, 1.0, 2.0, 21196.0, 1e38, 0.5]
@@ -25,6 +28,10 @@ WORDS = [
     "FILE_TRANSFER",
     "DATA_STREAM",
     "HEARTBEAT",
+    "FOLLOW_TARGET",
+    "MANUAL_CONTROL",
+    "LOG_",
+    "SERIAL_CONTROL",
 ]
 HANDLED = [
     name for name in dir(mavlink) if name.startswith("MAVLINK_MSG_ID_") and any(w in name for w in WORDS)
@@ -153,6 +160,9 @@ def test_random_commands_with_likely_numbers() -> None:
         401,
         262,
         400,
+        34,
+        35,
+        179,
     ]
     for _ in range(3000):
         number = generator.choice(numbers)
@@ -166,6 +176,83 @@ def test_random_commands_with_likely_numbers() -> None:
         assert len(acks) == 1, (number, params)
         assert acks[0].result == 0 or client.texts(), (number, params)
     alive(rig)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_request_for_files(seed: int, tmp_path: Path) -> None:
+    """FTP payloads with likely numbers and paths, and requests for logs, while something is under way."""
+    generator = random.Random(2000 + seed)
+    (tmp_path / "states.parquet").write_bytes(generator.randbytes(5000))
+    rig = Rig(logs=LogFolder(tmp_path))
+    clients = [rig.client(channel=Channel(0.1, 0.1, 0.1, seed)), rig.client(14540, link=1)]
+    paths = [
+        b"/",
+        b"/log/states.parquet",
+        b"@PARAM/param.pck",
+        b"/etc/extras/parameters.json",
+        b"..",
+        b"\xff\0",
+    ]
+    for _ in range(1500):
+        data = generator.choice(paths) + generator.randbytes(generator.choice((0, 0, 0, 5, 200)))
+        size = generator.choice((len(data) & 0xFF, generator.randrange(256)))
+        opcode = generator.choice((*range(17), 128, 129, 200, 255))
+        offset = generator.choice((0, 0, 1, 239, 4999, 5000, 0xFFFFFFFF, generator.randrange(6000)))
+        header = struct.pack(
+            "<HBBBBBBI", generator.randrange(0x10000), generator.randrange(4), opcode, size, 0, 0, 0, offset
+        )
+        payload = (header + data)[:251].ljust(251, b"\0")
+        number, count = generator.choice((0, 0, 1, 0xFFFF)), generator.choice((0, 90, 5000, 0xFFFFFFFF))
+        generator.choice(clients).send(
+            generator.choice(
+                (
+                    mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload),
+                    mavlink.MAVLink_log_request_data_message(1, 1, number, offset, count),
+                    mavlink.MAVLink_log_request_list_message(1, 1, 0, number),
+                )
+            )
+        )
+        if generator.random() < 0.2:
+            rig.run(0.02)
+    assert all(len(peer.queue) <= 1000 for peer in rig.station.peers)
+    alive(rig)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_sticks_targets_and_attitudes_in_flight(seed: int) -> None:
+    """Whatever they ask for, targets stay finite and the vehicle answers."""
+    generator = random.Random(3000 + seed)
+    rig = Rig()
+    client = rig.client()
+    rig.fly(client)
+    modes = ((3, 0), (2, 0), (3, 1), (4, 8), (4, 3), (6, 0))
+    kinds = (
+        mavlink.MAVLink_manual_control_message,
+        mavlink.MAVLink_follow_target_message,
+        mavlink.MAVLink_set_attitude_target_message,
+        mavlink.MAVLink_set_position_target_local_ned_message,
+    )
+    for _ in range(600):
+        kind = generator.choice(kinds)
+        payload = bytearray(generator.randbytes(kind.unpacker.size))
+        for offset in range(0, len(payload) - 3, 4):
+            if generator.random() < 0.5:
+                struct.pack_into("<f", payload, offset, generator.choice(SPICE))
+        values = kind.unpacker.unpack(bytes(payload))
+        raw = bytearray(kind.unpacker.pack(*values))
+        raw = raw[: -1 - generator.randrange(2)] if generator.random() < 0.3 else raw
+        client.send_raw(frame(bytes(raw), kind.id, kind.crc_extra, 0, 255, 190, False))
+        client.send(mavlink.MAVLink_manual_control_message(1, *(generator.choice((0, 500, 1000)),) * 4, 0))
+        if generator.random() < 0.3:
+            main, sub = generator.choice(modes)
+            client.send(mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, main, sub, 0, 0, 0, 0))
+        rig.run(0.02)
+        numbers = [n for field in ("position", "velocity") for n in getattr(rig.target, field, ())]
+        assert not any(math.isinf(n) for n in numbers)
+    client.clear()
+    client.send(mavlink.MAVLink_ping_message(1, 77, 0, 0))
+    rig.run(1.5)
+    assert [m.seq for m in client.got("PING")] == [77]
 
 
 def test_a_flood_is_bounded() -> None:

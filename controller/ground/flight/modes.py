@@ -17,7 +17,7 @@ from controller.ground.flight.geometry import above, filled, hanging_load, limit
 from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.patterns import Orbit, Pattern
-from controller.ground.flight.preconditions import arming_faults
+from controller.ground.flight.preconditions import arming_faults, has_settled
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
 from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
@@ -328,7 +328,9 @@ class Machine:
         """What the law is to do now. The same object as before if nothing has changed."""
         self.view = view
         if not self.armed:
-            if view.health.position and view.in_reach and view.hil_age < math.inf:
+            # Clients arm as soon as there is a home: there is none before that would be accepted.
+            known = self.home is not None or has_settled(view, self.parameters)
+            if known and view.health.position and view.in_reach and view.hil_age < math.inf:
                 self._guidance.set_home(view)
             target: Target = Idle(False)
         else:

@@ -25,10 +25,10 @@ def arming_faults(view: VehicleView | None, parameters: Parameters, fence: Fence
     faults = []
     if view.hil_age > STALE:
         faults.append(f"no sensor data for {view.hil_age:.1f} s; is the plant running?")
-    faults += [f"{name} not ready; wait, or see SYS_STATUS" for name in _unhealthy(view)]
+    faults += [f"{name} not ready; wait, or see SYS_STATUS" for name in unhealthy(view)]
     if not view.in_reach:
         return [*faults, "the state is beyond all bounds; restart the plant"]
-    speed = max(math.hypot(*view.velocity), math.hypot(*view.load_velocity))
+    speed = _speed(view)
     if speed > parameters["COM_ARM_SPEED"]:
         faults.append(f"not at rest ({speed:.2f} m/s); wait, or raise COM_ARM_SPEED")
     angle = math.degrees(tilt(view))
@@ -40,7 +40,18 @@ def arming_faults(view: VehicleView | None, parameters: Parameters, fence: Fence
     return [*faults, outside] if outside else faults
 
 
-def _unhealthy(view: VehicleView) -> list[str]:
+def has_settled(view: VehicleView, parameters: Parameters) -> bool:
+    """Whether every sensor and estimate is good and shows a vehicle at rest, as at arming."""
+    return not unhealthy(view) and view.in_reach and _speed(view) <= parameters["COM_ARM_SPEED"]
+
+
+def _speed(view: VehicleView) -> float:
+    """Of the faster body, m/s."""
+    return max(math.hypot(*view.velocity), math.hypot(*view.load_velocity))
+
+
+def unhealthy(view: VehicleView) -> list[str]:
+    """Names of the sensors and estimates that are not good."""
     health = view.health
     return [
         name
