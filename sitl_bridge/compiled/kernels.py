@@ -20,7 +20,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import compile_result
 from numba.core.environment import Environment
 
-from sitl_bridge.compiled import cache
+from sitl_bridge.compiled import cache, optimizing
 from sitl_bridge.compiled.key import kernel_key
 
 _SYMBOL = re.compile(r"_ZN\d+(kernel\..*)\.([0-9a-f]{64})E")
@@ -95,6 +95,7 @@ class KernelCache(_Cache):  # type: ignore[misc]  # Numba has no types
         for thing in [*module.functions, *module.global_variables]:
             if not thing.is_declaration and thing.name != symbol:
                 thing.linkage = "internal"
+        optimizing.simplify(module)
         data.library.symbol = symbol
         data.fndesc.mangled_name = symbol
         data.fndesc.env_name = f"{symbol}.env"

@@ -22,9 +22,8 @@ from numba.np import arrayobj
 
 from sitl_bridge.compiled import kernels
 from sitl_bridge.compiled.marks import VECTOR_KERNEL, Buffer, Declaration, mark_of
+from sitl_bridge.compiled.optimizing import RAISED
 
-RAISED = "sitl_bridge_raised"
-"""C function that is called where a compiled function raises; it exists nowhere."""
 _ALLOCATES = ("NRT required", "Only accept returning of array passed into the function")
 """In what Numba says about a function that allocates."""
 _POINTER = ir.IntType(8).as_pointer()

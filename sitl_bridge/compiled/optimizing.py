@@ -8,9 +8,10 @@ from typing import Any
 
 import llvmlite.binding as llvm
 
-from sitl_bridge.compiled.lowering import RAISED
 from sitl_bridge.compiled.marks import Declaration
 
+RAISED = "sitl_bridge_raised"
+"""C function that is called where a compiled function raises; it exists nowhere."""
 _LIBM = {
     name + suffix
     for name in (
@@ -21,8 +22,8 @@ _LIBM = {
     for suffix in ("", "f")
 }
 _MEMORY = {"memcpy", "memset", "memmove"}
-_ROUNDS = 2
-"""The first inlines; the second knows that what is left does not raise, and drops what would be done then."""
+_MOST_ROUNDS = 3
+"""A further one knows that what was not inlined does not raise, and drops what would be done then."""
 
 
 @functools.cache
@@ -49,15 +50,25 @@ def optimized(entry: Declaration, modules: Sequence[Any]) -> Any:
     for thing in [*whole.functions, *whole.global_variables]:
         if not thing.is_declaration and thing.name != entry.symbol:
             thing.linkage = "internal"
-    for _ in range(_ROUNDS):
-        passes = llvm.create_pass_builder(_target(), llvm.create_pipeline_tuning_options(speed_level=3))
-        passes.getModulePassManager().run(whole, passes)
-    missing = {f.name for f in whole.functions if f.is_declaration and not f.name.startswith("llvm.")}
-    if RAISED in missing:
+    for _ in range(_MOST_ROUNDS):
+        _run_passes(whole, level=3)
+        missing = {f.name for f in whole.functions if f.is_declaration and not f.name.startswith("llvm.")}
+        forbidden = missing - _LIBM - _MEMORY
+        if not forbidden:
+            return whole
+    if RAISED in forbidden:
         raise RuntimeError(f"{entry.name} may raise an exception")
-    if forbidden := missing - _LIBM - _MEMORY:
-        raise RuntimeError(f"{entry.name} needs {', '.join(sorted(forbidden))}, which compiled code has not")
-    return whole
+    raise RuntimeError(f"{entry.name} needs {', '.join(sorted(forbidden))}, which compiled code has not")
+
+
+def simplify(kernel: Any) -> None:
+    """Shorten the LLVM module of one kernel, once for all entry points that call it."""
+    _run_passes(kernel, level=2)
+
+
+def _run_passes(module: Any, level: int) -> None:
+    passes = llvm.create_pass_builder(_target(), llvm.create_pipeline_tuning_options(speed_level=level))
+    passes.getModulePassManager().run(module, passes)
 
 
 def object_code(parts: Iterable[Any]) -> bytes:
