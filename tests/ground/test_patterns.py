@@ -46,6 +46,18 @@ def test_an_orbit_is_flown_and_reported() -> None:
     assert client.got("ORBIT_EXECUTION_STATUS") == []
 
 
+@pytest.mark.parametrize(("frame", "altitude"), [(0, 494.0), (3, 494.0), (3, 6.0), (6, 494.0)])
+def test_the_altitude_of_an_orbit_may_be_above_mean_sea_level_in_any_frame(
+    frame: int, altitude: float
+) -> None:
+    """MAVSDK's do_orbit sends it so with frame 3, and PX4 reads it so."""
+    rig, client = flying()
+    assert client.command_int(ORBIT, (5.0, 2.0, 0.0, NAN), *CENTRE, altitude, frame).result == ACCEPTED
+    pattern = rig.station.machine.pattern
+    assert pattern is not None
+    assert pattern.centre[2] == pytest.approx(6.0, abs=0.15)
+
+
 def test_an_orbit_ends_after_the_turns_that_were_asked_for() -> None:
     rig, client = flying()
     assert orbit(client, 3.0, 2.0, turn=2 * math.pi).result == ACCEPTED

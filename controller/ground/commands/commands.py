@@ -265,7 +265,10 @@ def _centre(c: Command, machine: Machine, name: str) -> Triple | Verdict:
         return not_now(f"{name} denied: no position yet; start the plant")
     home = machine.profile.origin.home
     east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, home.altitude))
-    return filled((east, north, _height(c, machine)), machine.view.position)
+    here = machine.view.position
+    # PX4 reads the altitude above mean sea level in any frame, and MAVSDK sends it so in a relative one.
+    readings = (_height(c, machine), c.p7 - home.altitude)
+    return filled((east, north, min(readings, key=lambda z: abs(z - here[2]))), here)
 
 
 def _or(value: float, default: float) -> float:
