@@ -21,7 +21,8 @@ from sitl_bridge.plant.log.account import Account
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
 from sitl_bridge.plant.physics.state import LOAD_POSITION
-from sitl_bridge.plant.simulation import NO_FAULTS, Diverged, Simulation
+from sitl_bridge.plant.sensing import Diverged
+from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.wire.load_to import LoadTo
 from sitl_bridge.plant.wire.truth_to import TruthTo
 from sitl_bridge.process import Speaker, StopRequest

@@ -5,9 +5,7 @@ The clock (`lockstep`, `realtime`) decides when a tick happens; this decides wha
 
 from __future__ import annotations
 
-import math
-from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,19 +13,23 @@ from pymavlink.dialects.v20 import common
 
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND, LocalOrigin
 from sitl_bridge.mavlink.framing import Frame, decode
-from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY, SENSOR_RESET
-from sitl_bridge.plant.faults.schedule import (
-    Action,
-    Faults,
-    from_command,
-    lightest_load,
-    timeline,
-    with_gusts,
-)
+from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY
+from sitl_bridge.plant.faults.due import DueFaults
+from sitl_bridge.plant.faults.schedule import Action, Faults, from_command, lightest_load, with_gusts
 from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.physics.world import World
-from sitl_bridge.plant.tick import exchange
+from sitl_bridge.plant.sensing import Diverged, Sensing
+from sitl_bridge.plant.stages import (
+    EVER,
+    Command,
+    LoopDelay,
+    Stage,
+    interval_ticks_left,
+    run,
+    ticks_left,
+)
+from sitl_bridge.plant.tick import NO_DATAGRAM, exchange
 from sitl_bridge.plant.wire.answers import AnswerReader
 from sitl_bridge.plant.wire.messages import TRUTH, TickWriter
 from sitl_bridge.plant.wire.slow_frames import LoadOnMap, SlowFrames
@@ -53,14 +55,9 @@ class Recorder(Protocol):
         """The next row is filled in."""
 
 
-class Diverged(ArithmeticError):
-    """The state is not finite any more: what was described cannot be simulated."""
-
-
 NO_FAULTS = Faults()
-_FAULT_GRAIN = 1e-9  # s; a fault at a tick's time happens at that tick, rounding or not
 BATTERY_STEP = 0.04
-"""So often the battery is drawn on, s: its charge needs no tick."""
+"""Interval at which the battery is drawn on, s."""
 
 
 class Simulation:
@@ -80,8 +77,7 @@ class Simulation:
         self.rate_hz = rate_hz
         self.period = 1.0 / rate_hz
         self.world = World(with_gusts(vehicle, faults), rate_hz, seed, lightest_load(faults))
-        self._faults = timeline(faults)
-        self._faults_done = 0
+        self._faults = DueFaults(faults, rate_hz)
         self._injected: dict[tuple[Any, ...], Action] = {}
         self.tick = 0
         """Number of the current tick."""
@@ -95,10 +91,8 @@ class Simulation:
         """Whether the scenario has begun."""
         self._last_tick = None if duration_s is None else max(1, round(duration_s * rate_hz))
         self._vehicle = vehicle
-        self._delay_ticks = vehicle.loop.delay_ticks
+        self._delay = LoopDelay(vehicle.loop.delay_ticks)
         self._on_begin = on_begin
-        self._first_sensed = 0
-        self._sensors_due = False
         self._truth = False
         self._heard = False
         home = vehicle.home
@@ -106,24 +100,40 @@ class Simulation:
         self.answers = AnswerReader(instance)
         """Reads what the autopilot says."""
         self._writer = TickWriter(instance, self.origin, self.world)
-        self._slow = SlowFrames(
-            LoadOnMap(self.origin),
-            self._writer.load,
-            self._writer.vehicle,
-            vehicle.battery,
-            rate_hz,
+        slow = SlowFrames(
+            LoadOnMap(self.origin), self._writer.load, self._writer.vehicle, vehicle.battery, rate_hz
         )
+        self._sensing = Sensing(self.world, self._writer, slow, self._inject_again)
         self._power = self.world.battery(0.0)
         self._battery_every = max(1, round(BATTERY_STEP * rate_hz))
-        self._under_way: deque[Array] = deque()
-        self.record_with(recorder)
+        self._commands: Sequence[Command] = ()
         self._datagram: bytes | None = None
-        self._ticks_left = 0  # on which nothing is due but what `exchange` does
+        self._ticks_left = 0  # that may be flown whole
+        self._flying = self._stages_of_flight()
+        self._stages = (*self._flying, *self._sensing.stages)
+        self._counts = [stage.count for stage in self._stages if stage.count is not None]
+        self.record_with(recorder)
         self._go_to_tick(0)
+
+    def _stages_of_flight(self) -> tuple[Stage, ...]:
+        """From the answer to the tick's end."""
+        world = self.world
+        return (
+            Stage("loop delay", self._hold_back_command, self._delay.ticks_left),
+            Stage("commands at the start", self._start_commands, lambda: EVER),
+            Stage("row of the log", self.record, self._log_ticks_left, self._took_row),
+            Stage("motion", self._move, world.motion_ticks_left, world.count_tick),
+            Stage("tick count", self._count_tick, lambda: EVER, self._count_tick),
+            Stage("battery", self._draw_on_battery, self._battery_ticks_left),
+            Stage("faults", self._apply_faults, self._fault_ticks_left),
+            Stage("next tick", self.next_tick, lambda: EVER, self.next_tick),
+            Stage("end of the scenario", self._end, self._end_ticks_left),
+        )
 
     def record_with(self, recorder: Recorder | None) -> None:
         """Have the states of the scenario kept from now on."""
         self._recorder = recorder
+        self._ticks_left = 0
         table = None if recorder is None else recorder.table
         self._exchange = exchange.bind(
             *self.answers.arrays,
@@ -140,24 +150,18 @@ class Simulation:
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for.
 
-        Raises Diverged. Ticks that `exchange` flies are not looked at, but GPS has it give way many times a
-        second.
+        Raises Diverged: not after every tick that is flown whole, but several times a second, when GPS is
+        due.
         """
         if self._datagram is None:
-            if not math.isfinite(sum(self.world.state.tolist())):
-                raise Diverged(f"the state is not finite any more at t = {self.scenario_time:.3f} s")
-            fresh = self._sensors_due and self.tick >= self._first_sensed
-            if fresh:
-                self._begin_sensing()
-            tick, time_usec, world = self.tick - self._first_sensed, self.time_usec, self.world
-            fix = world.measure(tick, not self.started)
-            if fresh:
-                world.measurement["updated"] |= SENSOR_RESET
-            seen = None if world.tracker is None else world.tracker.sample(tick, world.state)
-            slow = self._slow.frames(tick, time_usec, world.state, self._power, seen)
             wanted = TRUTH if self._truth and self._heard else 0
-            self._datagram = slow + self._writer.datagram(time_usec, fix, wanted)
-            self._ticks_left = self._count_ticks_left() if self.started else 0
+            try:
+                self._datagram = self._sensing.datagram(
+                    self.tick, self.time_usec, not self.started, self._power, wanted
+                )
+            except Diverged as error:
+                raise Diverged(f"{error} at t = {self.scenario_time:.3f} s") from None
+            self._ticks_left = ticks_left(self._stages) if self.started else 0
         return self._datagram
 
     def heard(self) -> None:
@@ -170,12 +174,10 @@ class Simulation:
         """
         if not self._heard:
             self._heard = True
-            self._first_sensed = self.tick + 1
-            self._sensors_due = True
+            self._sensing.first_tick = self.tick + 1
+            self._sensing.due = True
 
-    def _begin_sensing(self) -> None:
-        self.world.reset_sensors()
-        self._sensors_due = False
+    def _inject_again(self) -> None:
         self._inject(self._injected.values())
 
     def _inject(self, actions: Iterable[Action]) -> None:
@@ -195,16 +197,14 @@ class Simulation:
         The sensors go on as they are: biases that were estimated before the start stay what they are.
         """
         self.world.reset_motion()
-        if self._sensors_due:
-            self._begin_sensing()
+        if self._sensing.due:
+            self._sensing.begin_afresh()
         self.started = True
         self._ticks_left = 0
-        self._under_way.clear()
-        for _ in range(self._delay_ticks):
-            self._under_way.append(np.array(self.world.initial_controls))
-        self._faults_done = 0
+        self._delay.restart(np.array(self.world.initial_controls))
+        self._faults.restart()
         self._power = self.world.battery(0.0)
-        self._inject(self._injected.values())
+        self._inject_again()
         self._apply_faults()
         self._on_begin()
 
@@ -222,13 +222,21 @@ class Simulation:
 
     def step(self, controls: Array) -> None:
         """Fly one tick under the controls (16,) that answer it (later by the loop's delay)."""
-        if self._delay_ticks:
-            self._under_way.append(controls.copy())
-            controls = self._under_way.popleft()
-        self.world.command(controls)
-        self.record()
-        self.world.advance(self.world.steps_per_tick)
-        self.finish_tick()
+        self._commands = (Command(0, controls),)
+        run(self._flying)
+
+    def fly_tick(self, commands: Sequence[Command]) -> None:
+        """Fly the current tick under commands that act from an integration step of it on, in order.
+
+        For a clock that delays commands by itself. The tick is flown whole where that is the same.
+        """
+        if self._ticks_left > 0 and all(command.step == 0 for command in commands):
+            for command in commands:
+                self.world.command(command.controls)
+            self._fly_whole(NO_DATAGRAM)
+            return
+        self._commands = commands
+        run(self._flying[1:])
 
     def exchange(self, datagram: bytes) -> bool:
         """Fly the current tick and have the next one's frames ready, in one go: True.
@@ -238,72 +246,88 @@ class Simulation:
         """
         if self._ticks_left <= 0:
             return False
-        answers, recorder, tick, length = self.answers, self._recorder, self.tick + 1, len(datagram)
-        answers.view[:length] = datagram
-        next_time_usec = self._time_usec(tick)
+        length = len(datagram)
+        self.answers.view[:length] = datagram
+        return self._fly_whole(length)
+
+    def _fly_whole(self, length: int) -> bool:
+        """The compiled tick on the datagram of this length, or on the commands as they are (NO_DATAGRAM)."""
+        recorder, tick = self._recorder, self.tick + 1
         size = self._exchange(
             length,
-            answers.system,
+            self.answers.system,
             self.time_usec,
-            next_time_usec,
+            self._time_usec(tick),
             *self.world.next_steps(),
-            tick - self._first_sensed,
+            tick - self._sensing.first_tick,
             -1 if recorder is None else recorder.count,
             TRUTH if self._truth else 0,
             self.ticks_flown / self.rate_hz,
         )
         if size == 0:
             return False
-        self.world.flown()
-        if recorder is not None:
-            recorder.took_row()
-        self.tick, self.time_usec = tick, next_time_usec
-        self.ticks_flown += 1
+        for count in self._counts:
+            count()
         self._ticks_left -= 1
         self._datagram = self._writer.written(size)
         return True
 
-    def _count_ticks_left(self) -> int:
-        """For how many ticks from the current one on nothing is due but what `exchange` does."""
-        recorder = self._recorder
-        if self._delay_ticks or self._sensors_due or (recorder is not None and recorder.table is None):
-            return 0
-        sensed, flown = self.tick - self._first_sensed, self.ticks_flown
-        ticks = min(self.world.ticks_left(sensed), self._slow.ticks_left(sensed))
-        if self._power is not None:
-            ticks = min(ticks, self._battery_every - 1 - flown % self._battery_every)
-        if self._last_tick is not None:
-            ticks = min(ticks, self._last_tick - 1 - flown)
-        if self._faults_done < len(self._faults):
-            due = math.ceil((self._faults[self._faults_done].time - _FAULT_GRAIN) * self.rate_hz)
-            ticks = min(ticks, due - 1 - flown)
-        return ticks
+    # The stages of a flight.
+
+    def _hold_back_command(self) -> None:
+        self._commands = [Command(c.step, self._delay.passed(c.controls)) for c in self._commands]
+
+    def _start_commands(self) -> None:
+        for command in self._commands:
+            if command.step == 0:
+                self.world.command(command.controls)
 
     def record(self) -> None:
         """Record the world at the current tick, with the rotors as they are commanded now."""
         if self._recorder is not None:
             self._recorder.record(self.scenario_time, self.world)
 
-    def finish_tick(self) -> None:
-        """The tick is over: the next one is the current one; the scenario's last is recorded too."""
+    def _took_row(self) -> None:
+        if self._recorder is not None:
+            self._recorder.took_row()
+
+    def _log_ticks_left(self) -> int:
+        return EVER if self._recorder is None or self._recorder.table is not None else 0
+
+    def _move(self) -> None:
+        flown = 0
+        for command in self._commands:
+            if command.step > 0:
+                self.world.advance(command.step - flown)
+                self.world.command(command.controls)
+                flown = command.step
+        self.world.advance(self.world.steps_per_tick - flown)
+
+    def _count_tick(self) -> None:
         self.ticks_flown += 1
+
+    def _draw_on_battery(self) -> None:
         if self.ticks_flown % self._battery_every == 0:
             self._power = self.world.battery(self._battery_every * self.period)
-        if self._faults:
-            self._apply_faults()
-        self.next_tick()
+
+    def _battery_ticks_left(self) -> int:
+        return EVER if self._power is None else interval_ticks_left(self._battery_every, self.ticks_flown)
+
+    def _apply_faults(self) -> None:
+        self._faults.apply(self.world, self.ticks_flown)
+
+    def _fault_ticks_left(self) -> int:
+        left = self._faults.ticks_left(self.ticks_flown)
+        return EVER if left is None else left
+
+    def _end(self) -> None:
+        """The scenario's last state is recorded too."""
         if self.ticks_flown == self._last_tick:
             self.finished = True
             self.record()
 
-    def _apply_faults(self) -> None:
-        """Let happen what is due at this tick of the scenario."""
-        while self._faults_done < len(self._faults):
-            due = self._faults[self._faults_done]
-            if due.time > self.scenario_time + _FAULT_GRAIN:
-                break
-            due.action.apply(self.world)
-            self._faults_done += 1
+    def _end_ticks_left(self) -> int:
+        return EVER if self._last_tick is None else self._last_tick - 1 - self.ticks_flown
 
     def handle(self, frame: Frame) -> bytes | None:
         """Answer anything else that the autopilot says; the reply, if one is due.

@@ -1,9 +1,9 @@
 """A whole tick in one compiled call: the autopilot's answer in, rotors, a row of the log, the steps, the
 sensors, the next tick's frames out.
 
-Each call from Python costs more than the physics of a tick, so most ticks of a flight go this way. What is
-out of the ordinary (another datagram, a fault, the battery, fresh random numbers) is done by the same parts,
-called singly; both give the same states, rows and bytes.
+Each call from Python costs more than the physics of a tick, so most ticks of a flight go this way: all on
+which no stage is due, see `stages`. The others are done by the same parts, called singly; both give the same
+states, rows and bytes.
 """
 
 from __future__ import annotations
@@ -27,6 +27,9 @@ from sitl_bridge.plant.sensors.instruments import CHANNELS, MEASUREMENT, ROWS
 from sitl_bridge.plant.wire import answers, messages
 from sitl_bridge.plant.wire.answers import ANSWERED, ARMED, READ_BUFFERS
 from sitl_bridge.plant.wire.messages import DATAGRAM_SIZE, OUTGOING, STATE, is_due
+
+NO_DATAGRAM = -1
+"""Length of the datagram for a tick that is flown on with the rotor speeds as they are."""
 
 _read_answer = answers.read_answer.python
 _set_rotors = dynamics.set_rotors.python
@@ -124,18 +127,20 @@ def exchange(
     time_s: float,
 ) -> int:
     """Fly the tick of `time_usec` if data[:length] is its armed answer and no more; returns the length of the
-    next tick's datagram in `out`, or 0 where nothing was done.
+    next tick's datagram in `out`, or 0 where nothing was done. With length NO_DATAGRAM it is flown in any
+    case.
 
     Arguments as for the parts: `answers.read_answer`, `dynamics.set_rotors` and `advance`, `rows.fill_row`
     (row < 0: there is no log), `sensing.measure`, `sensors.instruments.read` (the next tick is `sensor_tick`
     of the sensors), `messages.write_tick`. force and wind become those that act at the tick's end; the tables
     have to last beyond it.
     """
-    found = _read_answer(data, frames, answer, answer_payload, controls, header, length, system)
-    if found != ANSWERED | ARMED or header[1] != time_usec:
-        return 0
+    if length != NO_DATAGRAM:
+        found = _read_answer(data, frames, answer, answer_payload, controls, header, length, system)
+        if found != ANSWERED | ARMED or header[1] != time_usec:
+            return 0
+        _set_rotors(record, controls, speed_share, rotor_speed)
     plan = schedules[0]
-    _set_rotors(record, controls, speed_share, rotor_speed)
     if row >= 0:
         _fill_row(record, x, inner, rotor_speed, force, log, row, time_s)
     _advance(

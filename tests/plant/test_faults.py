@@ -28,9 +28,10 @@ from sitl_bridge.plant.faults.schedule import (
 )
 from sitl_bridge.plant.physics.state import CABLE_HOLDS
 from sitl_bridge.plant.physics.world import World
+from sitl_bridge.plant.sensing import Diverged
 from sitl_bridge.plant.sensors.gps import NO_FIX
 from sitl_bridge.plant.sensors.instruments import GARBAGE, LOST, OFF, STUCK, WORKS, WRONG
-from sitl_bridge.plant.simulation import Diverged, Simulation
+from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle, validated
 
 TABLE = {
@@ -184,11 +185,12 @@ def test_sensor_faults_reach_the_world() -> None:
     world = hovering()
     SetSensor("gps", LOST).apply(world)
     SetSensor("accelerometer", OFF).apply(world)
-    fixes = [fix for tick in range(60) if (fix := world.measure(tick, False)) is not None]
+    world.measure(0, False)
+    fixes = [fix for tick in range(60) if (fix := world.gps.sample(tick, world.state)) is not None]
     assert [fix.fix_type for fix in fixes] == [NO_FIX] * 3
     assert world.measurement["updated"][0] == 0x1FFF & ~0x7
     world.reset()
-    assert world.measure(0, False).fix_type != NO_FIX  # type: ignore[union-attr]
+    assert world.gps.sample(0, world.state).fix_type != NO_FIX  # type: ignore[union-attr]
 
 
 def sent(faults: list[dict[str, object]], count: int = 1000, seed: int = 1) -> list[tuple[float, int]]:

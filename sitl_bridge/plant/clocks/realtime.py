@@ -14,6 +14,7 @@ from sitl_bridge.plant.clocks.receiver import HilReceiver
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.physics.state import STOPPED, Array
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.stages import Command
 
 AUTOPILOT_TIMEOUT = 0.3
 """Silence after which the rotors stop, s."""
@@ -103,20 +104,17 @@ class Realtime:
         """Advance over the tick that ends now, each command from the substep on in which it arrived."""
         simulation = self.simulation
         steps = simulation.world.steps_per_tick
-        simulation.record()
-        flown = 0
+        commands: list[Command] = []
+        acts_from = 0
         while self._pending and self._pending[0][0] <= now:
             arrival, controls = self._pending.popleft()
             share = (arrival - self._tick_began) / simulation.period
-            until = max(flown, min(steps, round(share * steps)))
-            simulation.world.advance(until - flown)
-            flown = until
-            simulation.world.command(controls)
+            acts_from = max(acts_from, min(steps, round(share * steps)))
+            commands.append(Command(acts_from, controls))
         if self._last_answer is not None and now - self._last_answer > AUTOPILOT_TIMEOUT:
             self._notices.once(
                 "silence", f"no answer from the autopilot for {AUTOPILOT_TIMEOUT} s: rotors stopped"
             )
             self._pending.clear()
-            simulation.world.command(STOPPED)
-        simulation.world.advance(steps - flown)
-        simulation.finish_tick()
+            commands.append(Command(acts_from, STOPPED))
+        simulation.fly_tick(commands)

@@ -31,10 +31,11 @@ from sitl_bridge.plant.physics.state import (
     initial_state,
 )
 from sitl_bridge.plant.sensors.atmosphere import air_pressure
-from sitl_bridge.plant.sensors.gps import GpsFix, GpsReceiver
+from sitl_bridge.plant.sensors.gps import GpsReceiver
 from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
 from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.sensors.truth import measure
+from sitl_bridge.plant.stages import EVER
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 
 SCHEDULE = np.dtype(
@@ -163,21 +164,16 @@ class World:
         """What `tick.exchange` needs of the world, in its order, as it changes."""
         return self._arrays
 
-    def ticks_left(self, sensor_tick: int) -> int:
-        """How many ticks, the last measured one being `sensor_tick`, need no more than `tick.exchange`."""
-        ticks = min(self.instruments.ticks_left(sensor_tick), self.gps.ticks_left(sensor_tick))
-        if self.tracker is not None:
-            ticks = min(ticks, self.tracker.ticks_left(sensor_tick))
-        for held in (self._force, self._wind):
-            if not held.constant:
-                ticks = min(ticks, (held.steps_left - 1) // self.steps_per_tick)
-        return ticks
+    def motion_ticks_left(self) -> int:
+        """How many ticks the tables of held forces and winds last beyond."""
+        held = [table for table in (self._force, self._wind) if not table.constant]
+        return min(((table.steps_left - 1) // self.steps_per_tick for table in held), default=EVER)
 
     def next_steps(self) -> tuple[int, int]:
         """Number of the next step in the tables of held forces and winds."""
         return self._force.next_step, self._wind.next_step
 
-    def flown(self) -> None:
+    def count_tick(self) -> None:
         """A tick was flown by `tick.exchange`."""
         if not self._force.constant:
             self._force.count(self.steps_per_tick)
@@ -223,14 +219,13 @@ class World:
         """Readings and truth of the sensors, state, and wind at vehicle and load, as they change."""
         return self.measurement, self._truth, self.state, self._wind.now
 
-    def measure(self, tick: int, held: bool) -> GpsFix | None:
+    def measure(self, tick: int, held: bool) -> None:
         """Fill `measurement` from the world as it is at a tick, to be called once for each in turn.
 
-        Returns the GPS fix that arrives at this tick, if any. A held vehicle measures as if it stood.
+        A held vehicle measures as if it stood.
         """
         self._measure(held, self.vehicle.home.altitude)
         self.instruments.read(tick)
-        return self.gps.sample(tick, self.state)
 
 
 def trim_controls(vehicle: Vehicle) -> tuple[float, ...]:
