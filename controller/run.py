@@ -21,6 +21,7 @@ from sitl_bridge.vehicle.description import Vehicle
 if TYPE_CHECKING:
     from controller.feedback.assessment import Assessor
     from controller.feedback.log import EstimateLog
+    from controller.law.state import Array
     from controller.pilot.ground_link import GroundOptions
     from controller.pilot.ground_session import Guided
 
@@ -54,32 +55,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
-    log: EstimateLog | None = None
-    feedback: Feedback | None = None
-    design = options.design
-    assessor: Assessor | None = None
-    if options.feedback == "estimate":
-        log, feedback, assessor = _estimating(options, speaker)
-        design = ON_ESTIMATE if design == "default" else design
-    elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
-        log, feedback = _estimating_beside(options)
-    guided: Guided | None = None
-    if options.path_from is None:
-        from controller.pilot.ground_session import Guided
-
-        guided = Guided(
-            options.vehicle, options.rate_hz, options.instance, _ground(options), speaker.say, assessor
-        )
-        session = new_session(guided.autopilot, options.instance, speaker.say, feedback, options.rate_hz)
-    else:
-        path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
-        session = new_session(
-            lambda controls: Autopilot(options.vehicle, design, options.rate_hz, path_from, controls),
-            options.instance,
-            speaker.say,
-            feedback,
-            options.rate_hz,
-        )
+    session, log, guided = open_session(options, speaker)
     speaker.say(
         f"{options.vehicle.name}, {options.design} design on {options.feedback} at {options.rate_hz:g} Hz, "
         f"waiting for a plant on {options.hil} (system {options.instance + 1})"
@@ -98,6 +74,36 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     outcome = {"stopped_by": stop.reason, "control_steps": session.steps}
     speaker.event("end", **outcome)
     return outcome
+
+
+def open_session(
+    options: ControllerOptions, speaker: Speaker
+) -> tuple[HilSession, EstimateLog | None, Guided | None]:
+    """The autopilot's side of the HIL link without the link, its log, and what ground control needs of it.
+
+    The caller closes what is not None.
+    """
+    log: EstimateLog | None = None
+    feedback: Feedback | None = None
+    design = options.design
+    assessor: Assessor | None = None
+    if options.feedback == "estimate":
+        log, feedback, assessor = _estimating(options, speaker)
+        design = ON_ESTIMATE if design == "default" else design
+    elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
+        log, feedback = _estimating_beside(options)
+    instance, say, rate = options.instance, speaker.say, options.rate_hz
+    if options.path_from is None:
+        from controller.pilot.ground_session import Guided
+
+        guided = Guided(options.vehicle, rate, instance, _ground(options), say, assessor)
+        return new_session(guided.autopilot, instance, say, feedback, rate), log, guided
+    path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
+
+    def autopilot(controls: Array) -> Autopilot:
+        return Autopilot(options.vehicle, design, rate, path_from, controls)
+
+    return new_session(autopilot, instance, say, feedback, rate), log, None
 
 
 def _ground(options: ControllerOptions) -> GroundOptions:

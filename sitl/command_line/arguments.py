@@ -62,6 +62,11 @@ def build_parser() -> argparse.ArgumentParser:
         add(fly)
     _duration(fly, "the scenario's, or until stopped")
     fly.add_argument(
+        "--in-process",
+        action="store_true",
+        help="join plant and controller in one process, without sockets: the same state log, faster",
+    )
+    fly.add_argument(
         "--plant-set",
         metavar="KEY=VALUE",
         action="append",

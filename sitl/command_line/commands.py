@@ -182,7 +182,7 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flights.scenario import GroundControl, load_scenario
     from sitl_bridge.mavlink.links import Address
 
-    timing = _timing(arguments, Timing("realtime", None))
+    timing = _timing(arguments, Timing("lockstep" if arguments.in_process else "realtime", None))
     scenario = load_scenario(arguments.scenario)
     options = FlightOptions(
         scenario_name=arguments.scenario,
@@ -202,10 +202,13 @@ def _fly(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         instance=arguments.instance,
         out=arguments.out,
+        in_process=arguments.in_process,
     )
     stop = StopRequest()
     stop.install()
     if isinstance(scenario.reference, GroundControl):
+        if arguments.in_process:
+            raise DescriptionError("--in-process", ["ground control takes processes of its own"])
         check_design(arguments.design)
         if arguments.json:
             raise DescriptionError("--json", ["under ground control there is no summary to print"])

@@ -6,14 +6,14 @@ import contextlib
 import itertools
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from controller.feedback.truth import estimates
 from sitl.flights.keep import keep_recording
-from sitl.flights.launch import Pair, ProgressLine, watch
+from sitl.flights.launch import Outcome, Pair, ProgressLine, watch
 from sitl.flights.report import OF_THE_PLANT, clear, write_report
 from sitl.flights.scenario import (
     GroundControl,
@@ -27,8 +27,10 @@ from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import Override
+from sitl_bridge.vehicle.files import DescriptionError, Override
 
+DEFAULT_DURATION = 60.0
+"""s, of a flight in one process whose scenario has none."""
 MIRRORED: dict[str, Any] = {"udpout": "udpin", "udpin": "udpout", "tcpin": "tcpout", "tcpout": "tcpin"}
 """Kind of the other end of a link."""
 
@@ -59,6 +61,8 @@ class FlightOptions:
     """None: a new folder under runs/; under ground control, no logs."""
     truth_to: tuple[str, int] | None = None
     """Host and port of a viewer that is shown the truth."""
+    in_process: bool = False
+    """Plant and controller joined in this process, without sockets."""
     ground: Sequence[str] = ()
     """Arguments of the controller for its ground-control links."""
 
@@ -107,6 +111,19 @@ class FlightOptions:
         except OSError as error:
             raise OSError(f"{error}; --instance N flies beside others, --hil on another port") from None
 
+    def check_in_process(self) -> None:
+        """Raises DescriptionError for what takes two processes."""
+        for flag, given in (
+            ("--drop", bool(self.drop_percent)),
+            ("--speed", self.speed is not None),
+            ("--clock realtime", self.clock != "lockstep"),
+            ("faults.link", bool(self.scenario.faults.link)),
+        ):
+            if given:
+                raise DescriptionError(
+                    "--in-process", [f"{flag} takes two processes with a link between them"]
+                )
+
     def checked_vehicle(self) -> Vehicle:
         """The vehicle as the controller is told, once it is sure that the processes take what they are given.
 
@@ -128,13 +145,47 @@ def new_folder(folder: Path) -> Path:
     raise AssertionError("numbers do not end")
 
 
+def _fly_here(options: FlightOptions, stop: StopRequest, show: Callable[[dict[str, Any]], None]) -> Outcome:
+    """Fly in this process; the outcome as two processes would leave it."""
+    from sitl.flights.in_process import InProcessFlight, fly_in_process
+
+    scenario, told = options.scenario, options.checked_vehicle()
+    only_plant = [Override(text, "--plant-set") for text in options.plant_overrides]
+    assert not isinstance(scenario.reference, GroundControl)
+    ended = fly_in_process(
+        InProcessFlight(
+            told=told,
+            flown=plant_vehicle(scenario, options.vehicle, [*options.overrides, *only_plant]),
+            path_from=scenario.reference.path,
+            duration_s=options.duration_s or scenario.duration or DEFAULT_DURATION,
+            rate_hz=options.rate_hz,
+            seed=options.seed,
+            design=options.design,
+            feedback=options.feedback or usual_feedback(scenario, told),
+            instance=options.instance,
+            faults=checked(scenario.faults, told),
+            out=options.out,
+        ),
+        stop,
+        show,
+        lambda text: print(f"fly: {text}", file=sys.stderr, flush=True),
+    )
+    failure = ended.account.pop("failure")
+    stopped = f"stopped by {stop.reason}" if stop else None
+    given_up = f"the plant gave up: {failure}" if failure else None
+    return Outcome(end=ended.account, failure=stopped or given_up, first_command_unix_s=ended.began_at)
+
+
 def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path]:
     """Fly; returns the summary and the output folder, where it is too. Raises DescriptionError, OSError."""
     scenario = options.scenario
     vehicle = options.checked_vehicle()
     for note in suited(scenario, options.vehicle, options.overrides).notes:
         print(f"fly: {note}", file=sys.stderr, flush=True)
-    options.check_port()
+    if options.in_process:
+        options.check_in_process()
+    else:
+        options.check_port()
     if options.out is None:
         name = f"{Path(options.scenario_name).stem}-{time.strftime('%Y%m%d-%H%M%S')}"
         options = replace(options, out=new_folder(Path("runs") / name))
@@ -162,7 +213,10 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
             f"error {np.linalg.norm(load - target):7.3f} m   {event['real_time_factor']:.2f} x real time"
         )
 
-    outcome = watch(Pair(*options.command_lines()), stop, show)
+    if options.in_process:
+        outcome = _fly_here(options, stop, show)
+    else:
+        outcome = watch(Pair(*options.command_lines()), stop, show)
     line.end()
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)

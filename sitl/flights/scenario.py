@@ -109,7 +109,7 @@ class Suited(NamedTuple):
     """One line each, for the person who flies it."""
 
 
-def suited(scenario: Scenario, vehicle: str | None, overrides: Overrides = ()) -> Suited:
+def suited(scenario: Scenario, vehicle: str | Vehicle | None, overrides: Overrides = ()) -> Suited:
     """What a scenario sets for a vehicle (None: its own), under the overrides that a person has given.
 
     Another vehicle keeps its own airframe, cable and load. A scenario with a reference of its own begins in
@@ -117,7 +117,8 @@ def suited(scenario: Scenario, vehicle: str | None, overrides: Overrides = ()) -
     """
     common, plant_only = _entries("set", scenario.set), _entries("plant_set", scenario.plant_set)
     notes: list[str] = []
-    name = vehicle or scenario.vehicle
+    asked_for = vehicle or scenario.vehicle
+    name = asked_for.name if isinstance(asked_for, Vehicle) else asked_for
     if name != scenario.vehicle:
         left_out = [entry.text for entry in (*common, *plant_only) if _key(entry).startswith(OF_THE_VEHICLE)]
         common, plant_only = (
@@ -127,7 +128,7 @@ def suited(scenario: Scenario, vehicle: str | None, overrides: Overrides = ()) -
         if left_out:
             notes.append(f"{', '.join(left_out)} is for {scenario.vehicle} only: {name} keeps its own")
     if not isinstance(scenario.reference, GroundControl):
-        described = load_vehicle(name, [*common, *overrides])
+        described = load_vehicle(asked_for, [*common, *overrides])
         asked = any(_key(entry) == "initial.start" for entry in overrides)
         if described.initial.start == "ground" and not asked:
             hanging = _hanging(described)
@@ -138,13 +139,13 @@ def suited(scenario: Scenario, vehicle: str | None, overrides: Overrides = ()) -
     return Suited(common, plant_only, notes)
 
 
-def scenario_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
+def scenario_vehicle(scenario: Scenario, vehicle: str | Vehicle | None, overrides: Overrides) -> Vehicle:
     """The scenario's vehicle, or another one, with what the command line says on top."""
     found = suited(scenario, vehicle, overrides)
     return load_vehicle(vehicle or scenario.vehicle, [*found.overrides, *overrides])
 
 
-def plant_vehicle(scenario: Scenario, vehicle: str | None, overrides: Overrides) -> Vehicle:
+def plant_vehicle(scenario: Scenario, vehicle: str | Vehicle | None, overrides: Overrides) -> Vehicle:
     """The vehicle that the plant simulates: the scenario's, with what the autopilot is not told."""
     found = suited(scenario, vehicle, overrides)
     entries = [*found.overrides, *found.plant_overrides, *overrides]

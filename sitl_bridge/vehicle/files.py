@@ -69,12 +69,16 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
         raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
 
 
-def load_vehicle(name_or_file: str, overrides: Iterable[str | Override] = ()) -> Vehicle:
+def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = ()) -> Vehicle:
     """Load a vehicle by shipped name or path, with `KEY=VALUE` overrides (`cable.rest_length=10`).
 
-    Raises DescriptionError, with one line for each fault.
+    A complete vehicle can be changed by overrides, too. Raises DescriptionError, with one line for each
+    fault.
     """
-    source, content = read_toml(name_or_file, resources.files("sitl_bridge") / "vehicles", "vehicle")
+    if isinstance(vehicle, Vehicle):
+        source, content = vehicle.name, vehicle.model_dump(exclude_none=True)
+    else:
+        source, content = read_toml(vehicle, resources.files("sitl_bridge") / "vehicles", "vehicle")
     for override in overrides:
         apply_override(content, override if isinstance(override, Override) else Override(override))
     if isinstance(sensors := content.get("sensors"), dict):

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from sitl.flights.free_ports import free_ports
-from sitl.flights.report import read_state_log
+import sitl
 from sitl.flights.scenario import (
     GroundControl,
     load_scenario,
@@ -57,15 +51,11 @@ def test_who_asks_for_the_ground_gets_it() -> None:
 
 @pytest.mark.parametrize("vehicle", vehicle_names())
 @pytest.mark.parametrize("scenario", FLOWN)
-def test_every_scenario_flies_every_vehicle(scenario: str, vehicle: str, tmp_path: Path) -> None:
+def test_every_scenario_flies_every_vehicle(scenario: str, vehicle: str) -> None:
     """Upright, in the air, and within metres of where it is to be."""
-    [port] = free_ports(1)
-    command = [sys.executable, "-m", "sitl", "fly", scenario, "--vehicle", vehicle, "--clock", "lockstep"]
-    command += ["--hil", f"udpout:127.0.0.1:{port}", "--duration", "12", "--out", str(tmp_path), "--json"]
-    flight = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
-    summary = json.loads(flight.stdout)
-    assert summary["completed"], flight.stderr
-    log = read_state_log(tmp_path / "state.parquet")
+    flight = sitl.fly(scenario, vehicle=vehicle, duration_s=12.0)
+    summary, log = flight.summary, flight.states
+    assert summary["completed"], flight.said
     upright = 1.0 - 2.0 * (log["attitude_qx"] ** 2 + log["attitude_qy"] ** 2)
     assert np.degrees(np.arccos(upright.min())) < 50.0
     assert summary["largest_error_at_end_m"] < 3.0

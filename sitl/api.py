@@ -1,0 +1,174 @@
+"""Flights from Python: `sitl.fly(...)`, for notebooks and scripts; see docs/python.md.
+
+A flight runs in this process, in lockstep, through the same MAVLink bytes as `sitl fly`. There is no global
+state: flights may run side by side in threads or processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.law.reference import Path as ReferencePath
+from sitl.flights.in_process import InProcessFlight, fly_in_process
+from sitl.flights.metrics import flight_metrics, reference_positions
+from sitl.flights.report import PROMISED, draw, read_state_log, write_report
+from sitl.flights.scenario import (
+    GroundControl,
+    Scenario,
+    load_scenario,
+    plant_vehicle,
+    scenario_vehicle,
+    usual_feedback,
+)
+from sitl.json_values import plain
+from sitl_bridge.plant.faults.schedule import checked
+from sitl_bridge.plant.log.state_log import FILE_NAME
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import DescriptionError, Override
+
+Array = NDArray[np.float64]
+DEFAULT_DURATION = 60.0
+"""s, of a scenario that has none."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight that is over. World ENU, body FLU, SI units."""
+
+    summary: dict[str, Any]
+    """The keys of `summary.json`; `estimate`, `picture`, `state_log_sha256` only with `out`."""
+    states: Mapping[str, Array]
+    """Columns of the state log, each (n,)."""
+    estimates: Mapping[str, Array] | None
+    """Columns of the estimate's log, each (m,); None without `out`, or on truth."""
+    reference: Array
+    """(n, 3), m: where the load was to be at each row, as it was set."""
+    said: tuple[str, ...]
+    """What plant and controller had to say."""
+    out: Path | None
+    """Where the logs are; None: nowhere."""
+
+    def table(self) -> Any:
+        """The state log with the reference as an Arrow table; `.to_pandas()` makes a data frame of it."""
+        import pyarrow as pa
+
+        columns = {
+            **self.states,
+            **{f"reference_{a}_m": c for a, c in zip("xyz", self.reference.T, strict=True)},
+        }
+        return pa.table({name: pa.array(column) for name, column in columns.items()})
+
+    def picture(self, file: str | Path) -> None:
+        """Draw the flight as `flight.png` shows it."""
+        draw(Path(file), dict(self.states), self.reference, self.summary)
+
+
+def fly(
+    scenario: str | Scenario = "setpoint",
+    *,
+    vehicle: str | Vehicle | None = None,
+    overrides: Sequence[str] = (),
+    plant_overrides: Sequence[str] = (),
+    seed: int = 0,
+    design: str = "default",
+    feedback: str | None = None,
+    rate_hz: float = 250.0,
+    duration_s: float | None = None,
+    out: str | Path | None = None,
+) -> Flight:
+    """Fly a scenario, and return when it is over.
+
+    scenario: a shipped name, a .toml file, or a `Scenario`. vehicle: a shipped name, a .toml file, or a
+    complete `Vehicle`; by default the scenario's. overrides: `KEY=VALUE` as for `--set`. plant_overrides: the
+    same, but the controller is not told. feedback: `truth` or `estimate`, by default as for `sitl fly`. out:
+    a folder for all that `sitl fly` leaves; by default nothing is written.
+
+    Raises DescriptionError, with a line for each fault, for what cannot be flown.
+    """
+    described = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    if isinstance(described.reference, GroundControl):
+        raise DescriptionError(
+            str(scenario), ["ground control takes processes of its own; expected a reference"]
+        )
+    if described.faults.link:
+        raise DescriptionError(str(scenario), ["faults.link takes two processes with a link between them"])
+    told, flown = _vehicles(described, vehicle, overrides, plant_overrides)
+    feedback = feedback or usual_feedback(described, told)
+    folder = None if out is None else Path(out)
+    ended = fly_in_process(
+        InProcessFlight(
+            told=told,
+            flown=flown,
+            path_from=described.reference.path,
+            duration_s=duration_s or described.duration or DEFAULT_DURATION,
+            rate_hz=rate_hz,
+            seed=seed,
+            design=design,
+            feedback=feedback,
+            faults=checked(described.faults, told),
+            out=folder,
+        )
+    )
+    path = described.reference.path(told.initial_load_position)
+    facts = {
+        "scenario": scenario if isinstance(scenario, str) else described.description,
+        "vehicle": told.name,
+        "design": design,
+        "feedback": feedback,
+        "seed": seed,
+        "clock": "lockstep",
+        "rate_hz": rate_hz,
+        "launch_to_first_command_s": None,
+        "first_command_unix_s": ended.began_at,
+        **{key: value for key, value in ended.account.items() if key != "stopped_by"},
+    }
+    if folder is None:
+        states = dict(zip(ended.names, np.asarray(ended.states).T, strict=True))
+        summary, estimates = _summary(facts, path, states), None
+    else:
+        summary, states, estimates = _written(facts, path, folder, told, feedback)
+    reference = reference_positions(path, states["time_s"])
+    return Flight(summary, states, estimates, reference, tuple(ended.said), folder)
+
+
+def _vehicles(
+    scenario: Scenario,
+    vehicle: str | Vehicle | None,
+    overrides: Sequence[str],
+    plant_overrides: Sequence[str],
+) -> tuple[Vehicle, Vehicle]:
+    """As the controller is told, and as the plant simulates."""
+    only_plant = [Override(text, "plant_overrides") for text in plant_overrides]
+    common = [Override(text, "overrides") for text in overrides]
+    told = scenario_vehicle(scenario, vehicle, common)
+    return told, plant_vehicle(scenario, vehicle, [*common, *only_plant])
+
+
+def _summary(facts: dict[str, Any], path: ReferencePath, states: dict[str, Array]) -> dict[str, Any]:
+    """The figures of a flight that nothing is written of."""
+    summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
+    if len(states["time_s"]) > 1:
+        load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+        summary |= flight_metrics(states["time_s"], load, reference_positions(path, states["time_s"]))
+    summary["settled"] = bool(summary["settled"] and facts["completed"])
+    return {key: plain(value) for key, value in summary.items()}
+
+
+def _written(
+    facts: dict[str, Any], path: ReferencePath, folder: Path, told: Vehicle, feedback: str
+) -> tuple[dict[str, Any], dict[str, Array], dict[str, Array] | None]:
+    from controller.feedback.log import ESTIMATE_NAME
+    from controller.feedback.truth import estimates
+    from sitl.flights.keep import keep_recording
+
+    summary = write_report(folder, facts, path, told if estimates(feedback, told) else None)
+    keep_recording(folder, told, path)
+    estimate_log = folder / ESTIMATE_NAME
+    found = read_state_log(estimate_log) if estimate_log.exists() else None
+    return summary, read_state_log(folder / FILE_NAME), found
