@@ -91,7 +91,8 @@ def locked(module: str, places: Sequence[Path]) -> Iterator[None]:
     """While this is held no other process compiles the module; where no place takes a lock there is none."""
     with _lock_file(module, places) as lock:
         if lock is not None:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(lock, fcntl.LOCK_EX)
         yield
 
 

@@ -114,7 +114,7 @@ class Description:
         if isinstance(value, FunctionType) and mark_of(value):
             self._text(f"kernel {kernel_digest(value)}")
         elif isinstance(value, CodeType):
-            self._add_code(value)
+            self._add_code(value, next(iter(value.co_consts), None))
         elif isinstance(value, tuple | list):
             self._text(f"{type(value).__qualname__} of {len(value)}")
             for item in value:
@@ -138,7 +138,7 @@ class Description:
         """Take in a kernel itself."""
         self._text(str(mark_of(function)))
         self.add(function.__defaults__)
-        self._add_code(function.__code__)
+        self._add_code(function.__code__, function.__doc__)
         for cell in function.__closure__ or ():
             self.add(cell.cell_contents)
         names = _names(function.__code__)
@@ -155,14 +155,14 @@ class Description:
             if name in vars(module):
                 self.add(vars(module)[name])
 
-    def _add_code(self, code: CodeType) -> None:
+    def _add_code(self, code: CodeType, docstring: object) -> None:
         self._text(
             f"{code.co_argcount} {code.co_flags} {code.co_names} {code.co_varnames} {code.co_freevars}"
         )
         self._hash.update(code.co_code)
         constants = list(code.co_consts)
-        if constants and isinstance(constants[0], str):
-            constants[0] = None  # the docstring
+        if isinstance(docstring, str) and constants[:1] == [docstring]:
+            constants[0] = None
         self.add(constants)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -27,13 +28,26 @@ class SharedLibrary:
     def __init__(self, file: Path) -> None:
         with suppress(OSError):  # its functions are looked up in the libraries that everybody sees
             ctypes.CDLL("libm.so.6", ctypes.RTLD_GLOBAL)
-        self._library = ctypes.CDLL(str(file))
+        try:
+            self._library = ctypes.CDLL(str(file))
+        except OSError:  # a file system from which nothing can be executed
+            self._library = _from_memory(file)
 
     def address(self, symbol: str) -> int:
         try:
             return ctypes.cast(self._library[symbol], ctypes.c_void_p).value or 0
         except AttributeError:
             return 0
+
+
+def _from_memory(file: Path) -> ctypes.CDLL:
+    """Load a shared library from a copy in memory."""
+    copy = os.memfd_create(file.name)
+    try:
+        os.write(copy, file.read_bytes())
+        return ctypes.CDLL(f"/proc/self/fd/{copy}")
+    finally:
+        os.close(copy)
 
 
 class ObjectFile:

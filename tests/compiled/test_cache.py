@@ -1,5 +1,6 @@
 """Which files of machine code are believed, and where they are kept."""
 
+import ctypes
 import os
 import tempfile
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sitl_bridge.compiled import cache as caching
+from sitl_bridge.compiled import machine_code
 from tests.compiled.sample import NAME, Sample, code_files, loaded, put
 
 
@@ -86,3 +88,19 @@ def test_what_was_not_used_for_long_goes_when_something_newer_comes(cache: Path)
     caching.store(NAME, "3" * 64, ".so", b"code", [cache])
     assert used.exists()
     assert not unused.exists()
+
+
+def test_a_shared_library_is_loaded_where_nothing_can_be_executed(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (file,) = code_files(cache)
+    load = ctypes.CDLL
+
+    def refuses(name: str, *mode: int) -> ctypes.CDLL:
+        if name == str(file):
+            raise OSError(f"{file}: failed to map segment from shared object")
+        return load(name, *mode)
+
+    monkeypatch.setattr(machine_code.ctypes, "CDLL", refuses)
+    loaded()
+    loaded()

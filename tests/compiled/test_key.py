@@ -1,10 +1,11 @@
 """What compiles again, and what does not."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from sitl_bridge.compiled import key, load
+from sitl_bridge.compiled import kernel, key, load
 from tests.compiled.sample import NAME, SOURCE, Sample, code_files, fresh, loaded, put
 
 
@@ -44,6 +45,18 @@ def test_a_moved_checkout_compiles_nothing(
     monkeypatch.syspath_prepend(tmp_path)
     assert loaded().__file__ == str(tmp_path / f"{NAME}.py")
     assert compilations == []
+
+
+def test_a_text_that_is_no_docstring_counts() -> None:
+    def described(text: str) -> str:
+        scope: dict[str, Any] = {}
+        exec(f"def f(x):\n    return {text!r}\ng = lambda x: {text!r}", scope)
+        return key.kernel_digest(kernel(scope["f"])) + key.kernel_digest(kernel(scope["g"]))
+
+    one, other = described("one"), described("other")
+    assert one[:64] != other[:64]
+    assert one[64:] != other[64:]
+    assert described("one") == one
 
 
 def test_machines_do_not_share_code_nor_overwrite_each_others(
