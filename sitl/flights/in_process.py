@@ -27,7 +27,8 @@ from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH, columns, fill_row, kep
 from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
 from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.physics.world import World
-from sitl_bridge.plant.simulation import NO_FAULTS, Diverged, Simulation
+from sitl_bridge.plant.sensing import Diverged
+from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 
