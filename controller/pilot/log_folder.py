@@ -29,7 +29,8 @@ class LogFolder:
                 status = entry.stat(follow_symlinks=False)
             except OSError:
                 continue
-            if stat.S_ISREG(status.st_mode) and entry.name.endswith(KINDS) and entry.name.isascii():
+            named = entry.name.endswith(KINDS) and entry.name.isascii()
+            if named and stat.S_ISREG(status.st_mode) and status.st_size:
                 found.append(LogFile(entry.name, status.st_size, int(status.st_mtime)))
         return sorted(found)
 

@@ -314,6 +314,19 @@ def test_logs_are_listed_and_downloaded(tmp_path: Path) -> None:
     assert [m.ofs for m in data] == list(range(100, len(CONTENT), 90))
 
 
+def test_logs_of_one_second_have_times_of_their_own(tmp_path: Path) -> None:
+    """MAVSDK-Python's examples/logfile_download.py names its copies by them."""
+    for name in ("a.json", "b.json", "c.json", "empty.json"):
+        (tmp_path / name).write_text("" if name == "empty.json" else "{}")
+        os.utime(tmp_path / name, (1_700_000_000, 1_700_000_000))
+    rig = Rig(logs=LogFolder(tmp_path))
+    client = rig.client()
+    client.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    rig.run(0.04)
+    times = [entry.time_utc for entry in client.got("LOG_ENTRY")]
+    assert times == [1_700_000_000, 1_700_000_001, 1_700_000_002]
+
+
 def test_logs_that_are_not_there_are_answered_at_once(tmp_path: Path) -> None:
     rig = Rig()
     client = rig.client()

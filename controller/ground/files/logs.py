@@ -76,8 +76,17 @@ class LogProtocol:
         self._erased: set[str] = set()
 
     def logs(self) -> list[LogFile]:
-        """What clients may see."""
-        return [log for log in self._store.list() if log.name not in self._erased]
+        """What clients may see, each of another second: they name their copies by it."""
+        found: list[LogFile] = []
+        times: set[int] = set()
+        for log in self._store.list():
+            if log.name not in self._erased:
+                time = log.time_utc
+                while time in times:
+                    time += 1
+                times.add(time)
+                found.append(log._replace(time_utc=time))
+        return found
 
     def read(self, name: str, offset: int, size: int) -> bytes:
         """A part of a log."""
