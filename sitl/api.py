@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from controller.law.reference import Path as ReferencePath
 from sitl.flights.in_process import InProcessFlight, fly_in_process
 from sitl.flights.metrics import flight_metrics, reference_positions
+from sitl.flights.outcome import judge
 from sitl.flights.report import PROMISED, draw, read_state_log, write_report
 from sitl.flights.scenario import (
     GroundControl,
@@ -130,7 +131,7 @@ def fly(
     }
     if folder is None:
         states = dict(zip(ended.names, np.asarray(ended.states).T, strict=True))
-        summary, estimates = _summary(facts, path, states), None
+        summary, estimates = _summary(facts, path, states, told), None
     else:
         summary, states, estimates = _written(facts, path, folder, told, feedback)
     reference = reference_positions(path, states["time_s"])
@@ -150,13 +151,17 @@ def _vehicles(
     return told, plant_vehicle(scenario, vehicle, [*common, *only_plant])
 
 
-def _summary(facts: dict[str, Any], path: ReferencePath, states: dict[str, Array]) -> dict[str, Any]:
+def _summary(
+    facts: dict[str, Any], path: ReferencePath, states: dict[str, Array], told: Vehicle
+) -> dict[str, Any]:
     """The figures of a flight that nothing is written of."""
     summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
     if len(states["time_s"]) > 1:
         load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
-        summary |= flight_metrics(states["time_s"], load, reference_positions(path, states["time_s"]))
-    summary["settled"] = bool(summary["settled"] and facts["completed"])
+        reference = reference_positions(path, states["time_s"])
+        summary |= flight_metrics(states["time_s"], load, reference)
+        summary["settled"] = bool(summary["settled"] and facts["completed"])
+        summary |= judge(states, reference, told, summary)._asdict()
     return {key: plain(value) for key, value in summary.items()}
 
 
@@ -167,7 +172,7 @@ def _written(
     from controller.feedback.truth import estimates
     from sitl.flights.keep import keep_recording
 
-    summary = write_report(folder, facts, path, told if estimates(feedback, told) else None)
+    summary = write_report(folder, facts, path, told if estimates(feedback, told) else None, told)
     keep_recording(folder, told, path)
     estimate_log = folder / ESTIMATE_NAME
     found = read_state_log(estimate_log) if estimate_log.exists() else None

@@ -110,6 +110,12 @@ def _audience(
     return viewer(vehicle, more)
 
 
+def _ground_piloted(scenario: Scenario) -> bool:
+    from sitl.flights.scenario import GroundControl
+
+    return isinstance(scenario.reference, GroundControl)
+
+
 def _plant(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments, of_plant=True)
     hil = _hil_address(arguments, "udpout")
@@ -132,6 +138,7 @@ def _plant(arguments: argparse.Namespace) -> int:
         on_silence=timing.on_silence,
         out=arguments.out,
         faults=_faults_of(scenario, vehicle),
+        end_when_lost=arguments.until_eof and scenario is not None and not _ground_piloted(scenario),
         load_to=arguments.load_to,
         truth_to=arguments.truth_to,
     )

@@ -237,6 +237,6 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     }
     path = path_from(start)
     estimating = vehicle if estimates(feedback, vehicle) else None
-    summary = write_report(options.out, facts, path, estimating)
+    summary = write_report(options.out, facts, path, estimating, vehicle)
     keep_recording(options.out, vehicle, path)
     return summary, options.out

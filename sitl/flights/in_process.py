@@ -131,6 +131,7 @@ def fly_in_process(
         flight.duration_s,
         on_begin=lambda: began.extend((time.monotonic(), time.time())),
         faults=flight.faults,
+        end_when_lost=True,
     )
     recorder: StateLog | MemoryLog
     tlog = None

@@ -14,7 +14,8 @@ from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.law.reference import Path as ReferencePath
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
 from sitl.flights.html_report import FILE_NAME as HTML_NAME
-from sitl.flights.metrics import SETTLED_WINDOW, Metrics, flight_metrics, reference_positions
+from sitl.flights.metrics import Metrics, flight_metrics, reference_positions
+from sitl.flights.outcome import FELL, judge
 from sitl.json_values import plain
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
@@ -40,7 +41,16 @@ OF_THE_PLANT = tuple(
     key for key in Account.__annotations__ if key not in ("completed", "failure", "stopped_by")
 )
 """Keys of the plant's account that go into the summary as they are; the others `sitl fly` knows better."""
-PROMISED = (*OF_THE_PLANT, *Metrics.__annotations__, "estimate", "picture", "state_log_sha256")
+PROMISED = (
+    *OF_THE_PLANT,
+    *Metrics.__annotations__,
+    "outcome",
+    "outcome_time_s",
+    "outcome_cause",
+    "estimate",
+    "picture",
+    "state_log_sha256",
+)
 """Keys of every summary, however the flight ended: null for what is not known."""
 
 Log = dict[str, NDArray[np.float64]]
@@ -75,12 +85,16 @@ def positions(log: Log, body: str) -> NDArray[np.float64]:
 
 
 def write_report(
-    out: Path, facts: dict[str, Any], path: ReferencePath | None, vehicle: Vehicle | None = None
+    out: Path,
+    facts: dict[str, Any],
+    path: ReferencePath | None,
+    vehicle: Vehicle | None = None,
+    described: Vehicle | None = None,
 ) -> dict[str, Any]:
     """Write summary.json and the picture next to the state log; returns the summary.
 
     facts: what is known besides the log; path: the reference, None when nothing has flown; vehicle: as the
-    controller was told, where it has left a log of its estimate.
+    controller was told, where it has left a log of its estimate; described: as it was told in any case.
     """
     state_log = out / FILE_NAME
     summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
@@ -94,6 +108,9 @@ def write_report(
             reference = reference_positions(path, log["time_s"])
             metrics = flight_metrics(log["time_s"], positions(log, "load"), reference)
             summary |= metrics
+            summary["settled"] = bool(summary["settled"] and facts.get("completed"))
+            if described is not None:
+                summary |= judge(log, reference, described, summary)._asdict()
             if vehicle is not None and (out / ESTIMATE_NAME).exists():
                 summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
             draw(out / PICTURE_NAME, log, reference, facts)
@@ -166,7 +183,7 @@ def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, 
 def table(summary: dict[str, Any]) -> str:
     """The few lines at the end of a flight."""
     rows = [
-        ("settled", _settled(summary)),
+        ("outcome", _outcome(summary)),
         ("2 % settling time", _with_unit(summary.get("settling_time_2pct_s"), "s", 2)),
         ("1 cm settling time", _with_unit(summary.get("settling_time_1cm_s"), "s", 2)),
         ("overshoot", _with_unit(summary.get("overshoot_pct"), "%", 1)),
@@ -180,14 +197,15 @@ def table(summary: dict[str, Any]) -> str:
     return "\n".join(f"  {name:<26}{value}" for name, value in rows if value)
 
 
-def _settled(summary: dict[str, Any]) -> str:
-    """Whether, and if not, by how much: GPS noise alone can be more than 2 % of a step."""
+def _outcome(summary: dict[str, Any]) -> str:
+    """How it ended, when and why: GPS noise alone can be more than 2 % of a step."""
     if summary["settled"]:
-        return "yes"
-    error, tolerance = summary.get("largest_error_at_end_m"), summary.get("settled_tolerance_m")
-    if error is None or tolerance is None or error <= tolerance:
-        return "NO"
-    return f"NO: up to {error:.2f} m off in the last {SETTLED_WINDOW:g} s, {tolerance:.2f} m allowed"
+        return "settled"
+    text = str(summary.get("outcome") or "did not settle").upper()
+    if summary.get("outcome") in FELL and summary.get("outcome_time_s") is not None:
+        text += f" at t = {summary['outcome_time_s']:.2f} s"
+    cause = summary.get("outcome_cause")
+    return f"{text}: {cause}" if cause else text
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

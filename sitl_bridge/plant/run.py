@@ -50,6 +50,8 @@ class PlantOptions:
     faults: Faults = NO_FAULTS
     load_to: tuple[str, int] | None = None
     """Ground station that is shown the load directly."""
+    end_when_lost: bool = False
+    """End the scenario a few seconds after the vehicle is lost."""
     truth_to: tuple[str, int] | None = None
     """Viewer that is shown the true state of vehicle and load."""
 
@@ -100,6 +102,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         options.duration_s,
         on_begin=progress.begin,
         faults=options.faults,
+        end_when_lost=options.end_when_lost,
     )
     punctual = options.clock == "realtime" or bool(options.faults.link)
     link = open_link(options.hil, speaker.say, punctual)

@@ -17,6 +17,7 @@ from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY
 from sitl_bridge.plant.faults.due import DueFaults
 from sitl_bridge.plant.faults.schedule import Action, Faults, from_command, lightest_load, with_gusts
 from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
+from sitl_bridge.plant.lost_vehicle import GRACE, LOOK_INTERVAL, is_lost
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.sensing import Diverged, Sensing
@@ -73,7 +74,9 @@ class Simulation:
         recorder: Recorder | None = None,
         on_begin: Callable[[], None] = lambda: None,
         faults: Faults = NO_FAULTS,
+        end_when_lost: bool = False,
     ) -> None:
+        """end_when_lost: end the scenario a few seconds after the vehicle turned over, fell or ran away."""
         self.rate_hz = rate_hz
         self.period = 1.0 / rate_hz
         self.world = World(with_gusts(vehicle, faults), rate_hz, seed, lightest_load(faults))
@@ -106,6 +109,7 @@ class Simulation:
         self._sensing = Sensing(self.world, self._writer, slow, self._inject_again)
         self._power = self.world.battery(0.0)
         self._battery_every = max(1, round(BATTERY_STEP * rate_hz))
+        self._look_every = max(1, round(LOOK_INTERVAL * rate_hz)) if end_when_lost else None
         self._commands: Sequence[Command] = ()
         self._datagram: bytes | None = None
         self._ticks_left = 0  # that may be flown whole
@@ -127,6 +131,7 @@ class Simulation:
             Stage("battery", self._draw_on_battery, self._battery_ticks_left),
             Stage("faults", self._apply_faults, self._fault_ticks_left),
             Stage("next tick", self.next_tick, lambda: EVER, self.next_tick),
+            Stage("lost vehicle", self._look_for_loss, self._look_ticks_left),
             Stage("end of the scenario", self._end, self._end_ticks_left),
         )
 
@@ -319,6 +324,18 @@ class Simulation:
     def _fault_ticks_left(self) -> int:
         left = self._faults.ticks_left(self.ticks_flown)
         return EVER if left is None else left
+
+    def _look_for_loss(self) -> None:
+        """A few seconds after the vehicle is lost the scenario is over."""
+        if self._look_every is None or self.ticks_flown % self._look_every:
+            return
+        if is_lost(self._vehicle, self.world.state):
+            end = self.ticks_flown + round(GRACE * self.rate_hz)
+            self._last_tick = end if self._last_tick is None else min(end, self._last_tick)
+            self._look_every = None
+
+    def _look_ticks_left(self) -> int:
+        return EVER if self._look_every is None else interval_ticks_left(self._look_every, self.ticks_flown)
 
     def _end(self) -> None:
         """The scenario's last state is recorded too."""

@@ -1,0 +1,31 @@
+"""When a vehicle is lost: turned over, on the ground in flight, or far away. The flight ends soon after."""
+
+from __future__ import annotations
+
+import math
+
+from sitl_bridge.frames import rotate
+from sitl_bridge.plant.physics.state import ATTITUDE, VEHICLE_POSITION, Array
+from sitl_bridge.vehicle.description import Vehicle
+
+FAR = 5000.0
+"""m from where the vehicle started, beyond which nobody flies a scenario."""
+GRACE = 3.0
+"""s that a flight goes on after its vehicle is lost: what happened is in the log."""
+LOOK_INTERVAL = 0.1
+"""s between two looks."""
+
+
+def is_lost(vehicle: Vehicle, x: Array) -> bool:
+    """Whether the vehicle of state x (19,) does not come back by itself."""
+    w, qx, qy, qz = x[ATTITUDE].tolist()
+    if rotate((w, qx, qy, qz), (0.0, 0.0, 1.0))[2] < 0.0:
+        return True
+    east, north, up = x[VEHICLE_POSITION].tolist()
+    start = vehicle.initial_vehicle_position
+    if not math.dist((east, north, up), start) < FAR:
+        return True
+    if vehicle.ground is None or vehicle.initial.start == "ground" or not vehicle.airframe.legs:
+        return False
+    legs = -min(leg[2] for leg in vehicle.airframe.legs)
+    return bool(up < vehicle.ground.height + 0.8 * legs)
