@@ -2,6 +2,31 @@
 
 Disarmed, or armed on the ground, the mode is only what will happen next; in the air `guidance` gives each
 mode its target. Requests are judged here, and failsafes change the mode.
+
+    stage    | goes on to | when
+    ---------+------------+----------------------------------------------------------------------
+    GROUND   | ASCENT     | armed, and TAKEOFF, MISSION, a set-point or a throttle that asks for height
+             | FLYING     | armed, and an attitude set-point in OFFBOARD with thrust to fly
+    ASCENT   | FLYING     | at its height in TAKEOFF; in any other mode when the load hangs clear
+             | DESCENT    | LAND
+    FLYING   | DESCENT    | LAND, or RTL above home, or a mission's landing
+             | GROUND     | an attitude set-point without thrust, on the ground
+    DESCENT  | GROUND     | the vehicle stands: landed
+             | FLYING     | any other mode, while the load hangs
+             | ASCENT     | any other mode, once the load lies
+    any      | GROUND     | disarmed
+
+    mode               | entered by                        | left by itself for
+    -------------------+-----------------------------------+-------------------------------------
+    TAKEOFF            | request                           | HOLD, at its height
+    HOLD               | request, point, failsafe          | POSITION, when a pilot's stick moves
+    MISSION            | request, with a plan              | HOLD, RTL, LAND, as the plan ends
+    RTL, LAND          | request, failsafe                 | HOLD, when landed
+    OFFBOARD           | request, with fresh set-points    | by COM_OBL_RC_ACT, without set-points
+    POSITION, ALTITUDE | request or stick, with fresh sticks | by NAV_RCL_ACT, without sticks
+    ORBIT              | DO_ORBIT or request               | HOLD, after the turns asked for
+    FOLLOW_TARGET      | request                           | (stands without a target)
+    TERMINATION        | command, failsafe                 | HOLD, when disarmed
 """
 
 from __future__ import annotations
