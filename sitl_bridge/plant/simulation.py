@@ -142,7 +142,7 @@ class Simulation:
         table = None if recorder is None else recorder.table
         self._exchange = exchange.bind(
             *self.answers.arrays,
-            *self.world.arrays(),
+            self.world.record,
             np.zeros((CHUNK_ROWS, WIDTH)) if table is None else table,
             *self._writer.arrays,
         )
@@ -260,7 +260,6 @@ class Simulation:
         recorder, tick = self._recorder, self.tick + 1
         size = self._exchange(
             length,
-            self.answers.system,
             self.time_usec,
             self._time_usec(tick),
             *self.world.next_steps(),

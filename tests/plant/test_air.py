@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from sitl_bridge.plant.physics.air import WIND_HOLD, Wind, gust_velocity
-from sitl_bridge.plant.physics.disturbance import HeldWind
+from sitl_bridge.plant.physics.disturbance import HELD, HeldWind
 from sitl_bridge.plant.physics.parameters import step_count
 from sitl_bridge.plant.physics.turbulence import Turbulent, dryden
 from sitl_bridge.plant.random_streams import stream
@@ -132,7 +132,7 @@ def test_a_gust_blows_at_its_time_whatever_the_step(rate_hz: float, stiffness: f
     vehicle = load_vehicle("iris", [f"cable.stiffness={stiffness}"])
     vehicle = vehicle.model_copy(update={"air": vehicle.air.model_copy(update={"gusts": (gust,)})})
     step = 1.0 / (rate_hz * step_count(vehicle, 1.0 / rate_hz))
-    held = HeldWind(vehicle, step, 1)
+    held = HeldWind(vehicle, step, 1, np.zeros(1, dtype=HELD)[0])
     times, blown = [], []
     for index in range(round(8.0 / step)):
         times.append(index * step)

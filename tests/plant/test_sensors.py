@@ -19,6 +19,7 @@ from sitl_bridge.plant.sensors.gps import FIX_3D, NO_FIX, GpsReceiver
 from sitl_bridge.plant.sensors.instruments import (
     CHANNELS,
     GARBAGE,
+    INSTRUMENTS,
     LOST,
     MEASUREMENT,
     OFF,
@@ -48,7 +49,7 @@ def record(sensors: Sensors, ticks: int, rate: float = RATE, seed: int = 1, **do
     """Readings (ticks, 13) of a truth of zeros but 95 600 Pa and 12 deg C."""
     truth = np.zeros(1, dtype=MEASUREMENT)
     truth["pressure"], truth["temperature"] = 95600.0, 12.0
-    instruments = Instruments(sensors, 1.0 / rate, seed, truth, SLOPE)
+    instruments = Instruments(sensors, 1.0 / rate, seed, truth, SLOPE, np.zeros(1, dtype=INSTRUMENTS))
     for name, what in doing.items():
         instruments.set(name, what)
     rows = np.empty((ticks, CHANNELS))
@@ -169,7 +170,7 @@ def test_quantisation_and_saturation() -> None:
 def test_own_rate_holds_and_marks_only_new_readings() -> None:
     sensors = Sensors(magnetometer=Instrument(noise_density=1e-9, rate=50.0))
     truth = np.zeros(1, dtype=MEASUREMENT)
-    instruments = Instruments(sensors, 1.0 / RATE, 1, truth, SLOPE)
+    instruments = Instruments(sensors, 1.0 / RATE, 1, truth, SLOPE, np.zeros(1, dtype=INSTRUMENTS))
     seen = []
     for tick in range(20):
         instruments.read(tick)

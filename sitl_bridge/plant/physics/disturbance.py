@@ -14,16 +14,20 @@ from sitl_bridge.vehicle.description import Disturbance, Vehicle
 
 STREAM = "white force"
 
+HELD = np.dtype([("table", "f8", (TABLE_ROWS, 6)), ("now", "f8", 6)])
+"""A table of draws, rows of (6,) for vehicle and load, world, and the row that acts now."""
+
 
 class HeldTable(ABC):
-    """A table of draws, rows of (6,) for vehicle and load, world; row k acts `hold_steps` steps."""
+    """Draws that are held: row k of the table acts `hold_steps` steps."""
 
-    def __init__(self, hold_time: float, step: float) -> None:
+    def __init__(self, hold_time: float, step: float, record: np.void) -> None:
+        """record: of HELD, written."""
         self.hold_steps = max(1, round(hold_time / step))
         self.hold = self.hold_steps * step
         """What a row really holds, s: a whole number of steps."""
-        self.table: NDArray[np.float64] = np.zeros((TABLE_ROWS, 6))
-        self.now: NDArray[np.float64] = np.zeros(6)
+        self.table: NDArray[np.float64] = record["table"]
+        self.now: NDArray[np.float64] = record["now"]
         """The row that acts now."""
         self.next_step = 0
         """Number of the next step, counted from row 0."""
@@ -62,8 +66,8 @@ class HeldTable(ABC):
 class HeldForce(HeldTable):
     """White force, N."""
 
-    def __init__(self, disturbance: Disturbance, step: float, seed: int) -> None:
-        super().__init__(disturbance.hold_time, step)
+    def __init__(self, disturbance: Disturbance, step: float, seed: int, record: np.void) -> None:
+        super().__init__(disturbance.hold_time, step, record)
         self._std = np.zeros(6)
         if disturbance.acts_on != "load":
             self._std[:3] = disturbance.force_std
@@ -86,8 +90,8 @@ class HeldForce(HeldTable):
 class HeldWind(HeldTable):
     """Air velocity at vehicle and load, m/s."""
 
-    def __init__(self, vehicle: Vehicle, step: float, seed: int) -> None:
-        super().__init__(WIND_HOLD, step)
+    def __init__(self, vehicle: Vehicle, step: float, seed: int, record: np.void) -> None:
+        super().__init__(WIND_HOLD, step, record)
         self._vehicle = vehicle
         self.reset(seed)
 

@@ -18,13 +18,12 @@ from sitl_bridge.plant.physics.battery import (
     reading,
 )
 from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
-from sitl_bridge.plant.physics.dynamics import WORK_ROWS, advance, set_rotors
+from sitl_bridge.plant.physics.dynamics import advance, set_rotors
 from sitl_bridge.plant.physics.parameters import parameters, step_count
+from sitl_bridge.plant.physics.record import WORLD
 from sitl_bridge.plant.physics.state import (
     CABLE_HOLDS,
     MOST_ROTORS,
-    REACTIONS_SIZE,
-    STATE_SIZE,
     STOPPED,
     Array,
     initial_inner_state,
@@ -32,22 +31,11 @@ from sitl_bridge.plant.physics.state import (
 )
 from sitl_bridge.plant.sensors.atmosphere import air_pressure
 from sitl_bridge.plant.sensors.gps import GpsReceiver
-from sitl_bridge.plant.sensors.instruments import MEASUREMENT, Instruments
+from sitl_bridge.plant.sensors.instruments import Instruments
 from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.sensors.truth import measure
 from sitl_bridge.plant.stages import EVER
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
-
-SCHEDULE = np.dtype(
-    [
-        ("steps", "i8"),  # integration steps of a tick
-        ("step", "f8"),  # s
-        ("force_hold", "i8"),  # steps that a row of the table of forces acts
-        ("wind_hold", "i8"),  # likewise
-        ("home_altitude", "f8"),  # m above mean sea level
-    ]
-)
-"""What stays the same from tick to tick."""
 
 
 class World:
@@ -60,60 +48,58 @@ class World:
         self.vehicle = vehicle
         self.steps_per_tick = step_count(vehicle, 1.0 / rate_hz, lightest_load)
         self.step = 1.0 / (rate_hz * self.steps_per_tick)
-        self.state = initial_state(vehicle)
-        self.inner = initial_inner_state(vehicle)
-        self.reactions = np.zeros(REACTIONS_SIZE)
-        self.rotor_speed = np.zeros(MOST_ROTORS)
+        self.record = np.zeros(1, dtype=WORLD)
+        """All that compiled code reads and writes, of shape (1,); the attributes below are views of it."""
+        fields = self.record[0]
+        self.state: Array = fields["state"]
+        self.inner: Array = fields["inner"]
+        self.reactions: Array = fields["reactions"]
+        self.rotor_speed: Array = fields["rotor_speed"]
         self.trim_controls = trim_controls(vehicle)
         self.initial_controls = self.trim_controls if vehicle.initial.start == "hover" else STOPPED
         """What the rotors do until the first command."""
         self._seed = seed
-        self._record = parameters(vehicle)
-        self._truth = np.zeros(1, dtype=MEASUREMENT)
+        self._parameters: NDArray[Any] = fields["parameters"]
+        self._parameters[:] = parameters(vehicle)
+        self._truth: NDArray[Any] = fields["truth"]
         altitude = vehicle.home.altitude
         slope = air_pressure(altitude + 0.5) - air_pressure(altitude - 0.5)
-        self.instruments = Instruments(vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope)
+        self.instruments = Instruments(
+            vehicle.sensors, 1.0 / rate_hz, seed, self._truth, slope, fields["instruments"]
+        )
         self.measurement = self.instruments.reading
         self._period = 1.0 / rate_hz
         self._drain = power_coefficients(vehicle, vehicle.battery) if vehicle.battery else ()
-        self._force = HeldForce(vehicle.disturbance, self.step, seed)
-        self._wind = HeldWind(vehicle, self.step, seed)
-        self._controls = np.zeros(MOST_ROTORS)
-        self._speed_share = np.ones(MOST_ROTORS)
-        self._set_rotors = set_rotors.bind(self._record, self._controls, self._speed_share, self.rotor_speed)
-        work = np.zeros((WORK_ROWS, STATE_SIZE))
+        self._force = HeldForce(vehicle.disturbance, self.step, seed, fields["force"])
+        self._wind = HeldWind(vehicle, self.step, seed, fields["wind"])
+        self._controls: Array = fields["controls"]
+        self._speed_share: Array = fields["speed_share"]
+        fields["magnetic_field"] = field_at(vehicle.home)
+        fields["schedule"] = (
+            self.steps_per_tick, self.step, self._force.hold_steps, self._wind.hold_steps, altitude
+        )  # fmt: skip
+        self._set_rotors = set_rotors.bind(
+            self._parameters, self._controls, self._speed_share, self.rotor_speed
+        )
         self._advance = advance.bind(
-            self._record,
+            self._parameters,
             self.state,
             self.inner,
             self.rotor_speed,
             self._force.table,
             self._wind.table,
-            work,
-        )
-        sensed = (
-            work,
-            np.array(field_at(vehicle.home)),
-            self.reactions,
-            self._truth,
+            fields["work"],
         )
         self._measure = measure.bind(
-            self._record, self.state, self.inner, self._force.now, self._wind.now, *sensed
-        )
-        plan = (self.steps_per_tick, self.step, self._force.hold_steps, self._wind.hold_steps, altitude)
-        self._arrays = (
-            self._record,
-            np.array([plan], dtype=SCHEDULE),
+            self._parameters,
             self.state,
             self.inner,
-            self._speed_share,
-            self.rotor_speed,
-            self._force.table,
             self._force.now,
-            self._wind.table,
             self._wind.now,
-            *sensed,
-            *self.instruments.arrays(),
+            fields["work"],
+            fields["magnetic_field"],
+            self.reactions,
+            self._truth,
         )
         self.reset()
 
@@ -160,10 +146,6 @@ class World:
             wind.advance(covered)
             steps -= covered
 
-    def arrays(self) -> tuple[NDArray[Any], ...]:
-        """What `tick.exchange` needs of the world, in its order, as it changes."""
-        return self._arrays
-
     def motion_ticks_left(self) -> int:
         """How many ticks the tables of held forces and winds last beyond."""
         held = [table for table in (self._force, self._wind) if not table.constant]
@@ -209,11 +191,11 @@ class World:
 
     def set_load_mass(self, mass: float | None) -> None:
         """Change the load's mass, kg; None: as described."""
-        self._record["load_mass"] = self.vehicle.load.mass if mass is None else mass
+        self._parameters["load_mass"] = self.vehicle.load.mass if mass is None else mass
 
     def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array, Array]:
         """Parameter record, state, inner state, commands and force as they change, for a log to read."""
-        return self._record, self.state, self.inner, self.rotor_speed, self._force.now
+        return self._parameters, self.state, self.inner, self.rotor_speed, self._force.now
 
     def sensed(self) -> tuple[NDArray[Any], NDArray[Any], Array, Array]:
         """Readings and truth of the sensors, state, and wind at vehicle and load, as they change."""

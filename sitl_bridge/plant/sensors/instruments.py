@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.plant.sensors.atmosphere import SEA_LEVEL_PRESSURE
 from sitl_bridge.plant.sensors.noise import RandomWalk, White
@@ -55,25 +54,28 @@ ROWS = 512
 """Ticks whose errors are drawn at once."""
 
 
-@entry_point(
-    Buffer(MEASUREMENT, (1,)),
-    Buffer(np.float64, (ROWS, CHANNELS)),
-    Buffer(np.float64, (ROWS, CHANNELS)),
-    Buffer(np.float64, (4, CHANNELS)),
-    Buffer(np.int64, (2, CHANNELS)),
-    Buffer(MEASUREMENT, (1,)),
-    int,
+INSTRUMENTS = np.dtype(
+    [
+        ("errors", "f8", (ROWS, CHANNELS)),  # of each tick of a block, SI
+        ("garbage", "f8", (ROWS, CHANNELS)),  # likewise
+        (
+            "figures",
+            "f8",
+            (4, CHANNELS),
+        ),  # rows: resolution (0: none), least, most, error if wrong
+        ("timing", "i8", (2, CHANNELS)),  # rows: ticks from reading to reading, what the sensor does
+        ("reading", MEASUREMENT, (1,)),
+    ]
 )
-def read(
-    truth: Any, errors: Array, garbage: Array, figures: Array, timing: Any, reading: Any, tick: int
-) -> int:
-    """Readings of one tick from the truth, as a real sensor gives them.
+"""All sensors of HIL_SENSOR."""
 
-    errors, garbage: of each tick of a block, SI; figures: rows of resolution (0: none), least and most, and
-    what a wrong sensor is off by; timing: rows of ticks from reading to reading, and of what the sensor
-    does; reading: written where it is new.
-    """
-    true, out = truth[0], reading[0]
+
+@entry_point(Buffer(MEASUREMENT, (1,)), Buffer(INSTRUMENTS, (1,)), int)
+def read(truth: Any, instruments: Any, tick: int) -> int:
+    """Readings of one tick from the truth, as a real sensor gives them, written where they are new."""
+    sensors = instruments[0]
+    errors, garbage, figures, timing = sensors.errors, sensors.garbage, sensors.figures, sensors.timing
+    true, out = truth[0], sensors.reading[0]
     row = tick % ROWS
     bits = 0
     for channel in range(CHANNELS):
@@ -146,27 +148,29 @@ class Instruments:
     """The sensors of HIL_SENSOR in time. `reading` is a record of MEASUREMENT, shape (1,)."""
 
     def __init__(
-        self, sensors: Sensors, tick_period: float, seed: int, truth: Any, pascals_per_metre: float
+        self,
+        sensors: Sensors,
+        tick_period: float,
+        seed: int,
+        truth: Any,
+        pascals_per_metre: float,
+        record: NDArray[Any],
     ) -> None:
-        """truth: record of MEASUREMENT that holds the truth at each `read`; pascals_per_metre: < 0, at
-        home."""
-        self.reading = np.zeros(1, dtype=MEASUREMENT)
-        self._errors = np.zeros((ROWS, CHANNELS))
-        self._garbage = np.zeros((ROWS, CHANNELS))
-        self._timing = np.ones((2, CHANNELS), dtype=np.int64)
-        self._figures = np.zeros((4, CHANNELS))
+        """truth: record of MEASUREMENT that holds the truth at each `read`; pascals_per_metre: < 0, at home;
+        record: (1,) of INSTRUMENTS, written."""
+        fields = record[0]
+        self.reading: NDArray[Any] = fields["reading"]
+        self._errors, self._garbage = fields["errors"], fields["garbage"]
+        self._timing, self._figures = fields["timing"], fields["figures"]
+        self._timing[:] = 1
         self._figures[1], self._figures[2] = -math.inf, math.inf
         self._slope = pascals_per_metre
         self._period = tick_period
         self._sensors = {name: getattr(sensors, name) for name in PLACES}
         for name, instrument in self._sensors.items():
             self._set_figures(name, instrument)
-        self._read = read.bind(truth, *self.arrays())
+        self._read = read.bind(truth, record)
         self.reset(seed)
-
-    def arrays(self) -> tuple[Array, Array, Array, NDArray[np.int64], NDArray[Any]]:
-        """The arrays of `read` behind the truth, as they change."""
-        return self._errors, self._garbage, self._figures, self._timing, self.reading
 
     def ticks_left(self, tick: int) -> int:
         """How many ticks after `tick` fresh errors are to be drawn."""

@@ -6,12 +6,11 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.ids import ACTUATOR_CONTROLS, vehicle_system
 from sitl_bridge.mavlink.framing import (
-    DATAGRAM,
-    FRAME_TABLE,
     LARGEST_DATAGRAM,
     MESSAGE_ID,
     MOST_FRAMES,
@@ -35,32 +34,39 @@ ANSWERED, ARMED, NOT_FINITE, OTHERS, FOREIGN, JUNK = 1, 2, 4, 8, 16, 32
 _FOREIGN_SHIFT = 8
 
 
-READ_BUFFERS = (
-    DATAGRAM,
-    FRAME_TABLE,
-    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
-    Buffer(np.uint8, (_PAYLOAD_SIZE,)),
-    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
-    Buffer(np.int64, (2,)),
+INBOX = np.dtype(
+    [
+        ("header", "i8", 2),  # number of frames, time_usec of the answer
+        ("system", "i8"),  # system id of the autopilot
+        ("controls", "f8", ACTUATOR_CONTROLS),  # the answer's
+        ("answer", HIL_ACTUATOR_CONTROLS.dtype, (1,)),
+        ("frames", np.int32, (MOST_FRAMES + 1, TABLE_COLUMNS)),  # where each frame stands, see `scan`
+        ("data", "u1", LARGEST_DATAGRAM),
+    ],
+    align=True,
 )
+"""A datagram from the autopilot, and what was found in it."""
+_ANSWER_AT: int = INBOX.fields["answer"][1]  # type: ignore[index]  # the type has fields
+
+READ_BUFFERS = (Buffer(INBOX, (1,)), Buffer(np.uint8, (_PAYLOAD_SIZE,)))
 """The array arguments of `read_answer`; `AnswerReader.arrays` has them."""
 
 
-@entry_point(*READ_BUFFERS, int, int)
-def read_answer(
-    data: Bytes,
-    table: Any,
-    records: Any,
-    payload: Bytes,
-    controls: Any,
-    header: Any,
-    length: int,
-    system: int,
-) -> int:
-    """Find the last HIL_ACTUATOR_CONTROLS of `system` in data[:length]; returns bits of what was found.
+@entry_point(*READ_BUFFERS, int)
+def read_answer(inboxes: Any, payload: Bytes, length: int) -> int:
+    """Find the last HIL_ACTUATOR_CONTROLS of the inbox's system in its data[:length]; returns bits of what
+    was found.
 
-    header: number of frames, time_usec of the answer; controls (16,): the answer's.
+    payload: the bytes of the inbox's answer, the same memory.
     """
+    inbox = inboxes[0]
+    data, table, header, controls, system = (
+        inbox.data,
+        inbox.frames,
+        inbox.header,
+        inbox.controls,
+        inbox.system,
+    )
     count = scan(data, table, length)
     header[0] = count
     found = 0
@@ -77,7 +83,7 @@ def read_answer(
     if good < length:
         found |= JUNK
     if found & ANSWERED:
-        record = records[0]
+        record = inbox.answer[0]
         for i in range(ACTUATOR_CONTROLS):
             controls[i] = record.controls[i]
             if not math.isfinite(controls[i]):
@@ -92,31 +98,32 @@ class AnswerReader:
     """Reads datagrams from the autopilot of one instance."""
 
     def __init__(self, instance: int) -> None:
-        self.controls = np.zeros(ACTUATOR_CONTROLS)
+        inbox = np.zeros(1, dtype=INBOX)
+        fields = inbox[0]
+        self.controls: NDArray[np.float64] = fields["controls"]
         """Of the latest answer, 0..1 for a rotor; possibly not finite."""
         self.system = vehicle_system(instance)
         """System id of the autopilot."""
-        data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
-        self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
-        header = np.zeros(2, dtype=np.int64)
-        record, payload = HIL_ACTUATOR_CONTROLS.record()
-        self.view = data.data
+        fields["system"] = self.system
+        self._table: NDArray[np.int32] = fields["frames"]
+        self.view = fields["data"].data
         """Where a datagram is put to be read."""
-        self._header = header.data  # numbers come faster out of a memoryview
-        self.arrays = (data, self._table, record, payload, self.controls, header)
+        self._header = fields["header"].data  # numbers come faster out of a memoryview
+        payload = inbox.view(np.uint8)[_ANSWER_AT : _ANSWER_AT + _PAYLOAD_SIZE]
+        self.arrays = (inbox, payload)
         """The array arguments of `read_answer`."""
         self._read = read_answer.bind(*self.arrays)
 
     @property
     def time_usec(self) -> int:
         """Of the tick that the latest answer is for."""
-        return self._header[1]
+        return int(self._header[1])
 
     def read(self, datagram: bytes) -> int:
         """Look through a datagram (at most 65536 bytes); returns bits of what it holds."""
         length = len(datagram)
         self.view[:length] = datagram
-        found: int = self._read(length, self.system)
+        found: int = self._read(length)
         return found
 
     def others(self, datagram: bytes) -> list[Frame]:

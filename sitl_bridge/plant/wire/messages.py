@@ -86,8 +86,10 @@ class Paced:
     `pace`: the interval and when it is due next, us.
     """
 
-    def __init__(self) -> None:
-        self.pace = np.array([0.0, math.inf])
+    def __init__(self, pace: Array) -> None:
+        """pace: (2,), written."""
+        self.pace = pace
+        self.pace[:] = 0.0, math.inf
 
     def every(self, interval_us: float) -> None:
         """As SET_MESSAGE_INTERVAL has it: microseconds; 0: at every tick; negative: never."""
@@ -166,38 +168,50 @@ def fill_state(out: Any, x: Array, truth: Any, wind: Array, geodesy: Array) -> N
     out.zacc = clipped(a[2] * MILLI_G_PER_METRE_PER_SECOND_SQUARED, -0x8000, 0x7FFF)
 
 
+OUTBOX = np.dtype(
+    [
+        ("geodesy", "f8", 5),  # see `fill_state`
+        ("counters", "i8", 4),  # sequence numbers and systems, by the names above
+        ("state_pace", "f8", 2),  # of HIL_STATE_QUATERNION, see `Paced`
+        ("messages", OUTGOING, (1,)),
+        ("datagram", "u1", DATAGRAM_SIZE),
+    ],
+    align=True,
+)
+"""What the plant says: the messages, and the datagram with their frames."""
+_MESSAGES_AT: int = OUTBOX.fields["messages"][1]  # type: ignore[index]  # the type has fields
+
+WRITE_BUFFERS = (Buffer(OUTBOX, (1,)), Buffer(np.uint8, (OUTGOING.itemsize,)))
+"""The first array arguments of `write_tick`; `TickWriter.arrays` has them."""
+
+
 @entry_point(
-    Buffer(OUTGOING, (1,)),
-    Buffer(np.uint8, (OUTGOING.itemsize,)),
+    *WRITE_BUFFERS,
     Buffer(MEASUREMENT, (1,)),
     Buffer(MEASUREMENT, (1,)),
     Buffer(np.float64, (STATE_SIZE,)),
     Buffer(np.float64, (6,)),
-    Buffer(np.float64, (5,)),
-    Buffer(np.int64, (4,)),
-    Buffer(np.uint8, (DATAGRAM_SIZE,)),
     int,
     int,
 )
 def write_tick(
-    records: Any,
+    outboxes: Any,
     payloads: Bytes,
     measurements: Any,
     truth: Any,
     x: Array,
     wind: Array,
-    geodesy: Array,
-    counters: Any,
-    out: Bytes,
     time_usec: int,
     wanted: int,
 ) -> int:
-    """Write the frames of one tick into `out`; returns the datagram's length.
+    """Write the frames of one tick into the outbox's datagram; returns its length.
 
-    records and payloads share their memory; the GPS record is filled by the caller. measurements: what the
-    sensors read, truth: what ideal ones would; wind and geodesy as for `fill_state`; wanted: bits.
+    payloads: the bytes of the outbox's messages, the same memory; the GPS message is filled by the caller.
+    measurements: what the sensors read, truth: what ideal ones would; wind as for `fill_state`; wanted: bits.
     """
-    messages = records[0]
+    outbox = outboxes[0]
+    counters, geodesy, out = outbox.counters, outbox.geodesy, outbox.datagram
+    messages = outbox.messages[0]
     system = counters[VEHICLE_SYSTEM]
     at = 0
     if wanted & GPS:
@@ -249,7 +263,9 @@ class TickWriter:
 
     def __init__(self, instance: int, origin: LocalOrigin, world: World) -> None:
         self._origin = origin
-        self._records = np.zeros(1, dtype=OUTGOING)
+        outbox = np.zeros(1, dtype=OUTBOX)
+        fields = outbox[0]
+        self._records: NDArray[Any] = fields["messages"]
         record = self._records[0]
         record["vehicle"]["frame_id"] = FRAME_LOCAL_NED
         record["vehicle"]["child_frame_id"] = FRAME_BODY_FRD
@@ -257,16 +273,16 @@ class TickWriter:
         record["load"]["q"][0] = 1.0
         for body in ("vehicle", "load"):  # the first element NaN: covariance unknown
             record[body]["pose_covariance"][0] = record[body]["velocity_covariance"][0] = math.nan
-        self._out = np.zeros(DATAGRAM_SIZE, dtype=np.uint8)
-        self._view = self._out.data
-        counters = np.array([0, 0, vehicle_system(instance), load_system(instance)], dtype=np.int64)
-        payloads = self._records.view(np.uint8)
-        geodesy = np.array([*origin.home, *origin.degrees_per_metre])
-        self._write = write_tick.bind(self._records, payloads, *world.sensed(), geodesy, counters, self._out)
-        self.state = Paced()
-        """When HIL_STATE_QUATERNION goes out."""
-        self.arrays = (self._records, payloads, geodesy, counters, self.state.pace, self._out)
+        self._view = fields["datagram"].data
+        counters: NDArray[np.int64] = fields["counters"]
+        counters[:] = 0, 0, vehicle_system(instance), load_system(instance)
+        fields["geodesy"] = [*origin.home, *origin.degrees_per_metre]
+        payloads = outbox.view(np.uint8)[_MESSAGES_AT : _MESSAGES_AT + OUTGOING.itemsize]
+        self.arrays = (outbox, payloads)
         """What `tick.exchange` needs of the writer, in its order, as it changes."""
+        self._write = write_tick.bind(*self.arrays, *world.sensed())
+        self.state = Paced(fields["state_pace"])
+        """When HIL_STATE_QUATERNION goes out."""
         self.vehicle = CountedPacker(vehicle_system(instance), COMPONENT_TRUTH, counters, VEHICLE_SEQUENCE)
         """Packs other frames of the plant about the vehicle."""
         self.load = CountedPacker(load_system(instance), COMPONENT_LOAD, counters, LOAD_SEQUENCE)
