@@ -1,0 +1,34 @@
+"""The map of the code leads to places that exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).parent.parent
+MAP = (TOP / "docs/architecture.md").read_text(encoding="utf-8")
+README = (TOP / "README.md").read_text(encoding="utf-8")
+SECTION = README[README.index("## Architecture") : README.index("**Clocks.**")]
+
+
+@pytest.mark.parametrize("text", [MAP, SECTION], ids=["map", "README"])
+def test_every_path_exists(text: str) -> None:
+    paths = re.findall(r"`([a-z_]+/[\w/.-]*)`", text)
+    assert len(paths) > 10
+    missing = [path for path in paths if not (TOP / path).exists()]
+    assert missing == []
+
+
+def test_every_name_is_defined_in_a_file_of_the_map() -> None:
+    """`function`, `Class` and `Class.method`, wherever the map names them in code type."""
+    files = [TOP / path for path in re.findall(r"`([a-z_]+/[\w/]+\.py)`", MAP)]
+    sources = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    names = set(re.findall(r"`((?:[A-Z][a-zA-Z]+\.)?[a-zA-Z_]*)`", MAP))
+    names -= {"controller", "sitl", "sitl_bridge", "time_usec"}
+    assert len(names) > 20
+    for name in names:
+        for part in name.split("."):
+            defined = rf"(def|class) {part}\b|^{part} = |self\.{part} = "
+            assert re.search(defined, sources, re.MULTILINE), name
