@@ -67,6 +67,7 @@ def build(modules: Iterable[str], places: list[Path], tell: Callable[[Sequence[s
             tell(under_way.pop(0).answer())
     for finish in under_way:
         tell(finish.answer())
+    cache.forget_unused(places)
 
 
 def _begin(module: str, places: list[Path]) -> Answer | _Finish:

@@ -22,7 +22,7 @@ SHARED_LIBRARY, OBJECT, TRANSLATION = ".so", ".o", ".bc"
 _DIGEST_SIZE = hashlib.sha256().digest_size
 _DAY = 86_400.0
 _KEPT = 30 * _DAY
-"""s; what was not loaded for longer is deleted when something else of the same module is stored."""
+"""s; what was not loaded for longer is deleted when something is compiled."""
 
 
 def directories() -> list[Path]:
@@ -76,9 +76,19 @@ def store(module: str, key: str, kind: str, code: bytes, places: Sequence[Path])
             with suppress(OSError):
                 temporary.unlink()
             continue
-        _forget_unused(directory, module)
         return file
     raise refusal
+
+
+def forget_unused(places: Sequence[Path]) -> None:
+    """Delete what was not loaded for long, of all modules."""
+    oldest = time.time() - _KEPT
+    for directory in places:
+        with suppress(OSError):
+            for entry in os.scandir(directory):
+                is_code = Path(entry.name).suffix in (SHARED_LIBRARY, OBJECT, TRANSLATION)
+                if is_code and entry.stat().st_mtime < oldest:
+                    os.unlink(entry)
 
 
 def code_of(file: Path) -> bytes:
@@ -126,11 +136,3 @@ def _mark_used(file: Path) -> None:
     now = time.time()
     if now - file.stat().st_mtime > _DAY:
         os.utime(file)
-
-
-def _forget_unused(directory: Path, module: str) -> None:
-    for kind in (SHARED_LIBRARY, OBJECT, TRANSLATION):
-        for file in directory.glob(f"{module}.*{kind}"):
-            with suppress(OSError):
-                if time.time() - file.stat().st_mtime > _KEPT:
-                    file.unlink()

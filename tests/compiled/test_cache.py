@@ -79,15 +79,19 @@ def test_the_next_directory_serves_where_the_first_cannot_be_written(
     assert len(code_files(second)) == 1
 
 
-def test_what_was_not_used_for_long_goes_when_something_newer_comes(cache: Path) -> None:
+def test_what_was_not_used_for_long_is_deleted(cache: Path) -> None:
     used, unused = (caching.store(NAME, digit * 64, ".so", b"code", [cache]) for digit in "12")
     for file, days in ((used, 20), (unused, 40)):
         os.utime(file, (file.stat().st_atime, file.stat().st_mtime - days * 86_400))
+    others = cache / "notes.txt"
+    others.touch()
+    os.utime(others, (0, 0))
     assert caching.find(NAME, "1" * 64, [cache]) == used
     assert used.stat().st_mtime > unused.stat().st_mtime + 30 * 86_400, "a load counts as use"
-    caching.store(NAME, "3" * 64, ".so", b"code", [cache])
+    caching.forget_unused([cache])
     assert used.exists()
     assert not unused.exists()
+    assert others.exists(), "only machine code is deleted"
 
 
 def test_a_shared_library_is_loaded_where_nothing_can_be_executed(
