@@ -59,6 +59,10 @@ def test_modes_without_position_control_are_denied_with_the_reason(main: int) ->
 def test_the_stick_is_a_velocity_in_the_headings_frame() -> None:
     rig, client = by_hand()
     assert rig.station.machine.mode.custom_mode == 3 << 16
+    rig.run(1.0 / 50)
+    beat = client.got("HEARTBEAT")[-1]
+    assert beat.base_mode & mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
+    assert not beat.base_mode & mavlink.MAV_MODE_FLAG_AUTO_ENABLED
     set_parameter(rig, client, "MPC_XY_VEL_MAX", 4.0)
     yaw = 0.3  # of the kinematic vehicle
     for x, y, along, left in ((1000, 0, 4.0, 0.0), (-1000, 0, -4.0, 0.0), (0, 1000, 0.0, -4.0)):

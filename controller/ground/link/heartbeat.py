@@ -7,16 +7,17 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.modes import Machine
-from controller.ground.flight.px4_modes import Mode
+from controller.ground.flight.px4_modes import BY_STICKS, Mode
 
 _ALWAYS = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
 _AUTO = mavlink.MAV_MODE_FLAG_AUTO_ENABLED | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+_STICKS = mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED
 _OFFBOARD = mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
 
 
 def base_mode(machine: Machine) -> int:
     """HEARTBEAT.base_mode."""
-    flags = _OFFBOARD if machine.mode is Mode.OFFBOARD else _AUTO
+    flags = _STICKS if machine.mode in BY_STICKS else _OFFBOARD if machine.mode is Mode.OFFBOARD else _AUTO
     armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if machine.armed else 0
     return int(_ALWAYS | flags | armed)
 
