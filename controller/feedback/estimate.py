@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -169,8 +168,7 @@ class EstimateFeedback:
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """Datagram in, estimator, control step, answer out; between two looks at the estimate's health."""
-        arrays = (*reader.buffers, *self.estimator.arrays, *law, writer.controls, *writer.buffers)
-        answer = partial(answer_estimate.bind(*arrays), *reader.systems)
+        answer = answer_estimate.bind(*reader.buffers, *self.estimator.arrays, *law, *writer.buffers)
 
         def plain_tick(length: int, last_time_usec: int, sequence: int) -> int:
             checks = self._only_good and (self._tick + 1) % CHECK_EVERY == 0

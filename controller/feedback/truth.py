@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Protocol
 
 from controller.hil.answers import AnswerWriter
@@ -65,8 +64,7 @@ class TruthFeedback:
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """Datagram in, control step, answer out."""
-        answer = answer_truth.bind(*reader.buffers, *law, writer.controls, *writer.buffers)
-        return partial(answer, *reader.systems)
+        return answer_truth.bind(*reader.buffers, *law, *writer.buffers)
 
     def restart(self) -> None:
         """Nor does it remember."""

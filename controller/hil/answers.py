@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.ids import ACTUATOR_CONTROLS, COMPONENT_AUTOPILOT, vehicle_system
@@ -16,28 +17,30 @@ _PAYLOAD_SIZE = HIL_ACTUATOR_CONTROLS.dtype.itemsize
 ANSWER_SIZE = 128  # a frame of 81 bytes of payload, with room
 
 
-CONTROLS = Buffer(np.float64, (ACTUATOR_CONTROLS,))
-WRITE_BUFFERS = (
-    Buffer(HIL_ACTUATOR_CONTROLS.dtype, (1,)),
-    Buffer(np.uint8, (_PAYLOAD_SIZE,)),
-    Buffer(np.uint8, (ANSWER_SIZE,)),
+OUTBOX = np.dtype(
+    [
+        ("system", "i8"),  # system id of the autopilot
+        ("controls", "f8", ACTUATOR_CONTROLS),  # that the next answer carries, 0..1
+        ("answer", HIL_ACTUATOR_CONTROLS.dtype, (1,)),
+        ("datagram", "u1", ANSWER_SIZE),
+    ],
+    align=True,
 )
-"""The other array arguments of `write_answer`; `AnswerWriter.buffers` has them."""
+"""The autopilot's answer, and the datagram with its frame."""
+_ANSWER_AT: int = OUTBOX.fields["answer"][1]  # type: ignore[index]  # the type has fields
+
+WRITE_BUFFERS = (Buffer(OUTBOX, (1,)), Buffer(np.uint8, (_PAYLOAD_SIZE,)))
+"""The array arguments of `write_answer`; `AnswerWriter.buffers` has them."""
 
 
-@entry_point(CONTROLS, *WRITE_BUFFERS, int, int, int, int)
-def write_answer(
-    controls: Any,
-    records: Any,
-    payload: Bytes,
-    out: Bytes,
-    time_usec: int,
-    armed: int,
-    sequence: int,
-    system: int,
-) -> int:
-    """Write the answer to a tick, with controls (16,) of 0..1 when armed; returns its length."""
-    record = records[0]
+@entry_point(*WRITE_BUFFERS, int, int, int)
+def write_answer(outboxes: Any, payload: Bytes, time_usec: int, armed: int, sequence: int) -> int:
+    """Write the answer to a tick into the outbox, with its controls when armed; returns the length.
+
+    payload: the bytes of the outbox's answer, the same memory.
+    """
+    outbox = outboxes[0]
+    record, controls, out, system = outbox.answer[0], outbox.controls, outbox.datagram, outbox.system
     record.time_usec = time_usec
     record.flags = FLAG_LOCKSTEP
     record.mode = MODE_FLAG_ARMED if armed else 0
@@ -50,18 +53,18 @@ class AnswerWriter:
     """Builds answers of one instance; `controls` (16,) is what the next one carries."""
 
     def __init__(self, instance: int, packer: Packer) -> None:
-        self.controls = np.zeros(ACTUATOR_CONTROLS)
-        self._system = vehicle_system(instance)
+        outbox = np.zeros(1, dtype=OUTBOX)
+        fields = outbox[0]
+        fields["system"] = vehicle_system(instance)
+        self.controls: NDArray[np.float64] = fields["controls"]
         self._packer = packer
-        record, payload = HIL_ACTUATOR_CONTROLS.record()
-        out = np.zeros(ANSWER_SIZE, dtype=np.uint8)
-        self.buffers = (record, payload, out)
-        """The arrays of `write_answer` beside the controls."""
-        self.view = out.data
+        self.buffers = (outbox, outbox.view(np.uint8)[_ANSWER_AT : _ANSWER_AT + _PAYLOAD_SIZE])
+        """The arrays of `write_answer`."""
+        self.view = fields["datagram"].data
         """Where an answer is written."""
-        self._write = write_answer.bind(self.controls, *self.buffers)
+        self._write = write_answer.bind(*self.buffers)
 
     def answer(self, time_usec: int, armed: bool) -> bytes:
         """The frame that answers the tick of `time_usec`."""
-        length = self._write(time_usec, armed, self._packer.next_sequence(), self._system)
+        length = self._write(time_usec, armed, self._packer.next_sequence())
         return bytes(self.view[:length])

@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.law.state import STATE_SIZE, Array
 from sitl_bridge.compiled import Buffer, entry_point, kernel
@@ -20,8 +21,6 @@ from sitl_bridge.frames import (
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
 from sitl_bridge.mavlink.framing import (
     COMPONENT,
-    DATAGRAM,
-    FRAME_TABLE,
     LARGEST_DATAGRAM,
     MESSAGE_ID,
     MOST_FRAMES,
@@ -53,7 +52,8 @@ SENSED = np.dtype(
         ("has_magnetometer", "b1"),
         ("has_altitude", "b1"),
         ("has_begun", "b1"),  # the plant's sensors have begun afresh with this tick
-    ]
+    ],
+    align=True,
 )
 """HIL_SENSOR in SI units and the autopilot's frames."""
 _IMU_BITS, _MAGNETOMETER_BITS, _ALTITUDE_BIT = 0x3F, 0x1C0, 0x800
@@ -101,36 +101,36 @@ def read_sensors(sensor: Any, out: Any) -> None:
     out.has_begun = bits & SENSOR_RESET != 0
 
 
-READ_BUFFERS = (
-    DATAGRAM,
-    FRAME_TABLE,
-    Buffer(INCOMING, (1,)),
-    Buffer(np.uint8, (INCOMING.itemsize,)),
-    Buffer(np.float64, (STATE_SIZE,)),
-    Buffer(SENSED, (1,)),
-    Buffer(np.int64, (2,)),
+INBOX = np.dtype(
+    [
+        ("header", "i8", 2),  # number of frames, time_usec of HIL_SENSOR
+        ("systems", "i8", 2),  # system ids of vehicle and load
+        ("estimate", "f8", STATE_SIZE),  # from the truth, eq. 31, ENU and FLU
+        ("sensed", SENSED, (1,)),  # of the last HIL_SENSOR
+        ("messages", INCOMING, (1,)),
+        ("frames", np.int32, (MOST_FRAMES + 1, TABLE_COLUMNS)),  # where each frame stands, see `scan`
+        ("data", "u1", LARGEST_DATAGRAM),
+    ],
+    align=True,
 )
+"""A datagram from the plant, and what was found in it."""
+_MESSAGES_AT: int = INBOX.fields["messages"][1]  # type: ignore[index]  # the type has fields
+
+READ_BUFFERS = (Buffer(INBOX, (1,)), Buffer(np.uint8, (INCOMING.itemsize,)))
 """The array arguments of `read_tick`; `TickReader.buffers` has them."""
 
 
-@entry_point(*READ_BUFFERS, int, int, int)
-def read_tick(
-    data: Bytes,
-    table: Any,
-    records: Any,
-    payloads: Bytes,
-    estimate: Array,
-    sensed: Any,
-    header: Any,
-    length: int,
-    vehicle_sys: int,
-    load_sys: int,
-) -> int:
-    """Read data[:length]; returns bits of what was found.
+@entry_point(*READ_BUFFERS, int)
+def read_tick(inboxes: Any, payloads: Bytes, length: int) -> int:
+    """Read the inbox's data[:length]; returns bits of what was found.
 
-    header: number of frames, time_usec of HIL_SENSOR. With truth of both bodies, estimate (18,) is written;
-    truth that is not finite is none. sensed: of the last HIL_SENSOR.
+    payloads: the bytes of the inbox's messages, the same memory. With truth of both bodies, the inbox's
+    estimate is written; truth that is not finite is none.
     """
+    inbox = inboxes[0]
+    data, table, header, estimate = inbox.data, inbox.frames, inbox.header, inbox.estimate
+    records, sensed = inbox.messages, inbox.sensed
+    vehicle_sys, load_sys = inbox.systems[0], inbox.systems[1]
     count = scan(data, table, length)
     header[0] = count
     found = 0
@@ -178,30 +178,27 @@ class TickReader:
     """Reads datagrams from the plant of one instance."""
 
     def __init__(self, instance: int) -> None:
-        self.estimate = np.zeros(STATE_SIZE)
+        inbox = np.zeros(1, dtype=INBOX)
+        fields = inbox[0]
+        self.estimate: Array = fields["estimate"]
         """State (18,) of the latest truth, eq. 31, ENU and FLU."""
-        self.sensed = np.zeros(1, dtype=SENSED)
+        self.sensed: NDArray[Any] = fields["sensed"]
         """The latest tick's record of SENSED, shape (1,)."""
-        self.systems = (vehicle_system(instance), load_system(instance))
-        """System ids of vehicle and load."""
-        data = np.zeros(LARGEST_DATAGRAM, dtype=np.uint8)
-        self._table = np.zeros((MOST_FRAMES + 1, TABLE_COLUMNS), dtype=np.int32)
-        header = np.zeros(2, dtype=np.int64)
-        self.view = data.data
+        fields["systems"] = vehicle_system(instance), load_system(instance)
+        self._table: NDArray[np.int32] = fields["frames"]
+        self.view = fields["data"].data
         """Where a datagram is put to be read."""
-        self._header = header.data  # numbers come faster out of a memoryview
-        records = np.zeros(1, dtype=INCOMING)
-        payloads = records.view(np.uint8)
-        self.gps = records[0]["gps"]
+        self._header = fields["header"].data  # numbers come faster out of a memoryview
+        self.gps = fields["messages"][0]["gps"]
         """The latest HIL_GPS, a record as on the wire."""
-        self.buffers = (data, self._table, records, payloads, self.estimate, self.sensed, header)
+        self.buffers = (inbox, inbox.view(np.uint8)[_MESSAGES_AT : _MESSAGES_AT + INCOMING.itemsize])
         """The arrays of `read_tick`."""
         self._read = read_tick.bind(*self.buffers)
 
     @property
     def time_usec(self) -> int:
         """Of the latest HIL_SENSOR."""
-        return self._header[1]
+        return int(self._header[1])
 
     @property
     def begun(self) -> bool:
@@ -212,7 +209,7 @@ class TickReader:
         """Everything in a datagram (at most 65536 bytes)."""
         length = len(datagram)
         self.view[:length] = datagram
-        found = self._read(length, *self.systems)
+        found = self._read(length)
         others: list[Frame] = []
         if found & OTHERS:
             rows = self._table[: self._header[0]].tolist()

@@ -10,11 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 from controller.hil import answers, ticks
-from controller.hil.answers import CONTROLS, WRITE_BUFFERS
+from controller.hil.answers import WRITE_BUFFERS
 from controller.hil.ticks import GPS, LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
 from controller.law import control_step as step
 from controller.law.control_step import LAW_BUFFERS
-from controller.law.state import Array
 from sitl_bridge.compiled import entry_point
 from sitl_bridge.mavlink.framing import Bytes
 
@@ -24,37 +23,30 @@ _write_answer = answers.write_answer.python
 _PLAIN = TICK | VEHICLE_TRUTH | LOAD_TRUTH
 
 
-@entry_point(*READ_BUFFERS, *LAW_BUFFERS, CONTROLS, *WRITE_BUFFERS, int, int, int, int, int)
+@entry_point(*READ_BUFFERS, *LAW_BUFFERS, *WRITE_BUFFERS, int, int, int)
 def answer_truth(
-    data: Bytes,
-    table: Any,
-    records: Any,
+    inboxes: Any,
     payloads: Bytes,
-    estimate: Array,
-    sensed: Any,
-    header: Any,
     designs: Any,
     allocations: Any,
     paths: Any,
     memories: Any,
     works: Any,
-    controls: Array,
-    answer: Any,
+    outboxes: Any,
     answer_payload: Bytes,
-    out: Bytes,
-    system: int,
-    load_system: int,
     length: int,
     last_time_usec: int,
     sequence: int,
 ) -> int:
-    """Answer data[:length] into `out`; returns the answer's length, 0 for what is no plain tick.
+    """Answer the inbox's data[:length] into the outbox; returns the answer's length, 0 for what is no plain
+    tick.
 
     Arguments as for the parts: `read_tick`, `control_step`, `write_answer`. A plain tick is later than
     `last_time_usec`, with truth of both bodies, and nothing beside but HIL_GPS and HIL_STATE_QUATERNION.
     """
-    found = _read_tick(data, table, records, payloads, estimate, sensed, header, length, system, load_system)
-    if found & ~GPS != _PLAIN or header[1] <= last_time_usec:
+    inbox = inboxes[0]
+    found = _read_tick(inboxes, payloads, length)
+    if found & ~GPS != _PLAIN or inbox.header[1] <= last_time_usec:
         return 0
-    _control_step(designs, allocations, paths, memories, works, estimate, controls)
-    return int(_write_answer(controls, answer, answer_payload, out, header[1], 1, sequence, system))
+    _control_step(designs, allocations, paths, memories, works, inbox.estimate, outboxes[0].controls)
+    return int(_write_answer(outboxes, answer_payload, inbox.header[1], 1, sequence))
