@@ -33,11 +33,10 @@ def contact(ground: Ground, gravity: float, mass: float, points: int) -> tuple[f
 
 
 @kernel
-def contact_force(
+def stuck_force(
     stiffness: Any,
     chi: Any,
     damping: Any,
-    friction: Any,
     depth: Any,
     stretch_x: Any,
     stretch_y: Any,
@@ -45,15 +44,23 @@ def contact_force(
     vy: Any,
     vz: Any,
 ) -> tuple[Any, Any, Any]:
-    """Force of the ground on one contact point, N, world.
+    """Force of the ground on a contact point that is in the ground and sticks, N, world.
 
     depth: m, positive in the ground; stretch: m, from its anchor; v: m/s, of the point, world.
     """
-    normal = stiffness * depth * (1.0 - chi * vz)
-    if depth <= 0.0 or normal <= 0.0:
-        return 0.0, 0.0, 0.0
     fx = -stiffness * stretch_x - damping * vx
     fy = -stiffness * stretch_y - damping * vy
+    return fx, fy, stiffness * depth * (1.0 - chi * vz)
+
+
+@kernel
+def contact_force(friction: Any, depth: Any, fx: Any, fy: Any, normal: Any) -> tuple[Any, Any, Any]:
+    """Force of the ground on any contact point, given what it is if the point sticks, N, world.
+
+    None in the air, never a pull, and a friction of at most mu times the normal force.
+    """
+    if depth <= 0.0 or normal <= 0.0:
+        return 0.0, 0.0, 0.0
     most = friction * normal
     squared = fx * fx + fy * fy
     if squared > most * most:
@@ -63,87 +70,100 @@ def contact_force(
     return fx, fy, normal
 
 
+@kernel
+def stuck_leg(
+    p: Any, x: Array, inner: Array, turned: Any, turning: Any, block: int, lane: int
+) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+    """Where a leg is, and what the ground does to it if it stands and sticks.
+
+    turned: rotation matrix by rows; turning: rad/s, both of the vehicle, world. Returns arm from the centre
+    of mass (x, y, z), m, world; depth in the ground, m; force (x, y, z), N, world.
+    """
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = turned
+    wx, wy, wz = turning
+    bx, by, bz = p.leg_x[block, lane], p.leg_y[block, lane], p.leg_z[block, lane]
+    ax = r00 * bx + r01 * by + r02 * bz
+    ay = r10 * bx + r11 * by + r12 * bz
+    az = r20 * bx + r21 * by + r22 * bz
+    number = LEG_LANES * block + lane
+    depth = p.ground_height - x[2] - az
+    fx, fy, fz = stuck_force(
+        p.leg_stiffness[block, lane],
+        p.contact_chi,
+        p.leg_damping[block, lane],
+        depth,
+        x[0] + ax - inner[ANCHOR_EAST + number],
+        x[1] + ay - inner[ANCHOR_NORTH + number],
+        x[3] + wy * az - wz * ay,
+        x[4] + wz * ax - wx * az,
+        x[5] + wx * ay - wy * ax,
+    )
+    return ax, ay, az, depth, fx, fy, fz
+
+
+@kernel
+def turning_of(turned: Any, x: Array) -> tuple[Any, Any, Any]:
+    """Angular velocity of the vehicle in the world, rad/s; turned: rotation matrix by rows."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = turned
+    return (
+        r00 * x[10] + r01 * x[11] + r02 * x[12],
+        r10 * x[10] + r11 * x[11] + r12 * x[12],
+        r20 * x[10] + r21 * x[11] + r22 * x[12],
+    )
+
+
+@kernel
+def write_wrench(out: Array, turned: Any, force: Any, moment: Any) -> None:
+    """Force (N, world) and moment (N m, turned from the world into the body) into out[0:6]."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = turned
+    out[0], out[1], out[2] = force
+    mx, my, mz = moment
+    out[3] = r00 * mx + r10 * my + r20 * mz
+    out[4] = r01 * mx + r11 * my + r21 * mz
+    out[5] = r02 * mx + r12 * my + r22 * mz
+
+
 @vector_kernel
 def ground_on_standing(p: Any, x: Array, inner: Array, out: Array) -> int:
     """As `ground_on_vehicle`, if every leg stands and sticks; returns how many do not."""
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_matrix(x[6], x[7], x[8], x[9])
-    # Turning, in the world.
-    wx = r00 * x[10] + r01 * x[11] + r02 * x[12]
-    wy = r10 * x[10] + r11 * x[11] + r12 * x[12]
-    wz = r20 * x[10] + r21 * x[11] + r22 * x[12]
-    px, py, vx, vy, vz = x[0], x[1], x[3], x[4], x[5]
-    below = p.ground_height - x[2]
-    chi, friction = p.contact_chi, p.leg_friction
-    total_x, total_y, total_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    turned = rotation_matrix(x[6], x[7], x[8], x[9])
+    turning = turning_of(turned, x)
+    friction = p.leg_friction
+    force_x, force_y, force_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     loose = 0
     for block in range(p.leg_blocks):
-        east = inner[ANCHOR_EAST + LEG_LANES * block : ANCHOR_EAST + LEG_LANES * (block + 1)]
-        north = inner[ANCHOR_NORTH + LEG_LANES * block : ANCHOR_NORTH + LEG_LANES * (block + 1)]
-        for i in range(LEG_LANES):
-            bx, by, bz = p.leg_x[block, i], p.leg_y[block, i], p.leg_z[block, i]
-            stiffness, damping = p.leg_stiffness[block, i], p.leg_damping[block, i]
-            ax = r00 * bx + r01 * by + r02 * bz
-            ay = r10 * bx + r11 * by + r12 * bz
-            az = r20 * bx + r21 * by + r22 * bz
-            fx = -stiffness * (px + ax - east[i]) - damping * (vx + wy * az - wz * ay)
-            fy = -stiffness * (py + ay - north[i]) - damping * (vy + wz * ax - wx * az)
-            depth, rise = below - az, vz + wx * ay - wy * ax
-            fz = stiffness * depth * (1.0 - chi * rise)
+        for lane in range(LEG_LANES):
+            ax, ay, az, depth, fx, fy, fz = stuck_leg(p, x, inner, turned, turning, block, lane)
             most = friction * fz
             # Without branches; a leg that is not there has zeros throughout, and is not loose.
-            loose += (depth <= 0.0) & (stiffness > 0.0) | (fz < 0.0) | (fx * fx + fy * fy > most * most)
-            total_x += fx
-            total_y += fy
-            total_z += fz
+            exists = p.leg_stiffness[block, lane] > 0.0
+            loose += (depth <= 0.0) & exists | (fz < 0.0) | (fx * fx + fy * fy > most * most)
+            force_x += fx
+            force_y += fy
+            force_z += fz
             moment_x += ay * fz - az * fy
             moment_y += az * fx - ax * fz
             moment_z += ax * fy - ay * fx
-    out[0], out[1], out[2] = total_x, total_y, total_z
-    out[3] = r00 * moment_x + r10 * moment_y + r20 * moment_z
-    out[4] = r01 * moment_x + r11 * moment_y + r21 * moment_z
-    out[5] = r02 * moment_x + r12 * moment_y + r22 * moment_z
+    write_wrench(out, turned, (force_x, force_y, force_z), (moment_x, moment_y, moment_z))
     return loose
 
 
 @kernel
 def ground_on_moving(p: Any, x: Array, inner: Array, out: Array) -> None:
     """As `ground_on_vehicle`, whatever the legs do: in the air, sticking or slipping."""
-    r00, r01, r02, r10, r11, r12, r20, r21, r22 = rotation_matrix(x[6], x[7], x[8], x[9])
-    # Turning, in the world.
-    wx = r00 * x[10] + r01 * x[11] + r02 * x[12]
-    wy = r10 * x[10] + r11 * x[11] + r12 * x[12]
-    wz = r20 * x[10] + r21 * x[11] + r22 * x[12]
-    total_x, total_y, total_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    turned = rotation_matrix(x[6], x[7], x[8], x[9])
+    turning = turning_of(turned, x)
+    force_x, force_y, force_z, moment_x, moment_y, moment_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(p.leg_count):
-        block, lane = i // LEG_LANES, i % LEG_LANES
-        bx, by, bz = p.leg_x[block, lane], p.leg_y[block, lane], p.leg_z[block, lane]
-        ax, ay, az = (
-            r00 * bx + r01 * by + r02 * bz,
-            r10 * bx + r11 * by + r12 * bz,
-            r20 * bx + r21 * by + r22 * bz,
-        )
-        fx, fy, fz = contact_force(
-            p.leg_stiffness[block, lane],
-            p.contact_chi,
-            p.leg_damping[block, lane],
-            p.leg_friction,
-            p.ground_height - x[2] - az,
-            x[0] + ax - inner[ANCHOR_EAST + i],
-            x[1] + ay - inner[ANCHOR_NORTH + i],
-            x[3] + wy * az - wz * ay,
-            x[4] + wz * ax - wx * az,
-            x[5] + wx * ay - wy * ax,
-        )
-        total_x += fx
-        total_y += fy
-        total_z += fz
+        ax, ay, az, depth, fx, fy, fz = stuck_leg(p, x, inner, turned, turning, i // LEG_LANES, i % LEG_LANES)
+        fx, fy, fz = contact_force(p.leg_friction, depth, fx, fy, fz)
+        force_x += fx
+        force_y += fy
+        force_z += fz
         moment_x += ay * fz - az * fy
         moment_y += az * fx - ax * fz
         moment_z += ax * fy - ay * fx
-    out[0], out[1], out[2] = total_x, total_y, total_z
-    out[3] = r00 * moment_x + r10 * moment_y + r20 * moment_z
-    out[4] = r01 * moment_x + r11 * moment_y + r21 * moment_z
-    out[5] = r02 * moment_x + r12 * moment_y + r22 * moment_z
+    write_wrench(out, turned, (force_x, force_y, force_z), (moment_x, moment_y, moment_z))
 
 
 @kernel
@@ -164,18 +184,19 @@ LOOSE = 6
 @kernel
 def ground_on_load(p: Any, x: Array, inner: Array) -> tuple[Any, Any, Any]:
     """Force of the ground on the load, N, world."""
-    fx, fy, fz = contact_force(
+    depth = p.ground_height + p.load_radius - x[15]
+    fx, fy, fz = stuck_force(
         p.load_stiffness,
         p.contact_chi,
         p.load_damping,
-        p.load_friction,
-        p.ground_height + p.load_radius - x[15],
+        depth,
         x[13] - inner[ANCHOR_EAST + LOAD_CONTACT],
         x[14] - inner[ANCHOR_NORTH + LOAD_CONTACT],
         x[16],
         x[17],
         x[18],
     )
+    fx, fy, fz = contact_force(p.load_friction, depth, fx, fy, fz)
     return fx, fy, fz
 
 
