@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.trajectory import stopping_distance
+from tests.ground.in_flight import flying
 from tests.ground.kinematic import ZURICH
 from tests.ground.rig import Channel, Client, Rig
 
@@ -142,7 +143,6 @@ def test_a_half_finished_upload_changes_nothing() -> None:
         (other(206), mavlink.MAV_MISSION_UNSUPPORTED, "206"),
         ((7, *waypoint(0, 0)[1:]), mavlink.MAV_MISSION_UNSUPPORTED_FRAME, "frame 7"),
         (waypoint(0, 0, NAN), mavlink.MAV_MISSION_INVALID_PARAM7, "altitude"),
-        (waypoint(0, 0, 1.0), mavlink.MAV_MISSION_INVALID_PARAM7, "too low for the load"),
         (waypoint(0, 0, 500.0), mavlink.MAV_MISSION_DENIED, "GF_MAX_VER_DIST"),
         (waypoint(2000, 0), mavlink.MAV_MISSION_DENIED, "GF_MAX_HOR_DIST"),
         ((6, *other(22)[1:9], 500.0), mavlink.MAV_MISSION_DENIED, "GF_MAX_VER_DIST"),
@@ -163,6 +163,20 @@ def test_what_cannot_be_flown_is_refused_whole(item: tuple[Any, ...], result: in
     assert "item 1" in text
     assert words in text
     assert same(download(client), SQUARE)
+
+
+def test_items_too_low_for_the_load_are_flown_as_low_as_it_allows_and_said() -> None:
+    rig, client = flying()
+    plan = [waypoint(3, 0, 5.0), waypoint(6, 0, 1.0)]
+    assert Uploader(client, plan).run() == ACCEPTED
+    rig.run(0.1)
+    assert any("too low for the load are flown at 2.1 m above home" in text for text in client.texts())
+    assert same(download(client), plan)  # as it went up
+    assert client.command(176, 1, 4, 4).result == 0
+    rig.run_until(lambda: rig.station.machine.mode.name == "HOLD")
+    fence = rig.station.machine.fence
+    assert fence is not None
+    assert rig.view.position[2] == pytest.approx(fence.home[2] + fence.least_height, abs=0.05)
 
 
 def test_two_clients_at_once_do_not_mix() -> None:

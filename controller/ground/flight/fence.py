@@ -45,10 +45,6 @@ class Fence(NamedTuple):
         """The position itself, or the lowest above it that keeps the load off the ground."""
         return (point[0], point[1], max(point[2], self.home[2] + self.least_height))
 
-    def refuses(self, point: Triple) -> str:
-        """Why a vehicle with its load cannot be sent to a position, or an empty string."""
-        return self.outside(point) or self.too_low(point)
-
 
 def fence_around(home: Triple, parameters: Parameters, profile: Profile, with_load: bool = True) -> Fence:
     """The fence of the parameters."""

@@ -340,6 +340,12 @@ class Machine:
         fault = self.check_plan(items)
         if fault is None:
             self.mission.replace(items)
+            fence = self._guidance.fence()
+            low = plan.too_low(items, self.profile, self.home_geodetic(), fence)
+            if low:
+                which = ", ".join(str(index) for index in low[:5]) + (", ..." if len(low) > 5 else "")
+                least = f"{fence.least_height:.1f} m above home (LND_CLEARANCE)"
+                self.say(INFO, f"Mission items too low for the load are flown at {least}: {which}")
         return fault
 
     def set_current_item(self, seq: int) -> Verdict:

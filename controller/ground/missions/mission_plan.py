@@ -74,6 +74,17 @@ def check(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fenc
     return None
 
 
+def too_low(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fence) -> list[int]:
+    """Items whose altitude the hanging load forbids; they are flown as low as it allows."""
+    return [
+        index
+        for index, item in enumerate(items)
+        if item.command in WITH_POSITION
+        and item.command not in (LAND, TAKEOFF)
+        and fence.too_low(place(item, profile, home))
+    ]
+
+
 def _check_item(item: Item, count: int, profile: Profile, home: Geodetic, fence: Fence) -> Fault | None:
     numbers = (item.p1, item.p2, item.p3, item.p4)
     for place_of, number in enumerate(numbers):
@@ -116,8 +127,5 @@ def _check_place(item: Item, profile: Profile, home: Geodetic, fence: Fence) -> 
     point = place(item, profile, home)
     if not item.has_place:  # above home, as far as the fence can tell before the flight
         point = (fence.home[0], fence.home[1], point[2])
-    fault = fence.outside(point) or ("" if item.command in (LAND, TAKEOFF) else fence.too_low(point))
-    if not fault:
-        return None
-    low = point[2] < fence.home[2] + fence.least_height
-    return Fault(mavlink.MAV_MISSION_INVALID_PARAM7 if low else mavlink.MAV_MISSION_DENIED, fault)
+    fault = fence.outside(point)
+    return Fault(mavlink.MAV_MISSION_DENIED, fault) if fault else None
