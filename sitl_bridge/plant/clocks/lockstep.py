@@ -3,10 +3,28 @@
 A protocol object without I/O: `receive(datagram, now)`, `to_send(now)`, `next_deadline()`. Over UDP an
 unanswered tick is sent again after a time-out, so loss, duplication, reordering and delay of datagrams
 change how long a run takes and never what happens in it.
+
+    state     | event                               | what happens                  | goes on to
+    ----------+-------------------------------------+-------------------------------+-----------
+    START     | the first tick is due               | send it                       | FREEWHEEL
+              | an answer                           | the autopilot is there        | READY
+    FREEWHEEL | the next tick is due                | go on to it, send it          | FREEWHEEL
+              | an answer to an older tick          | the autopilot is there        | WAITING
+              | the answer to this tick             | the autopilot is there;       | READY
+              |                                     | the tick is over              |
+    READY     | the tick is due                     | send it                       | WAITING
+    WAITING   | the answer to this tick             | the tick is over              | READY
+              | time-out                            | send it again                 | WAITING
+              | time-out after the last repeat, and | fly it with the last controls,| WAITING
+              | `on_silence` is "continue"          | send the next                 |
+
+A tick that is over has been flown under the answer's controls, or held before the scenario began. The first
+armed answer begins the scenario. Any other answer is a duplicate or late, and is dropped.
 """
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Literal
 
 from sitl_bridge.plant.clocks.receiver import HilReceiver
@@ -20,6 +38,9 @@ SILENCE_BEFORE_NOTICE = 1.0
 """And at least so long without an answer before anything is said, s."""
 
 OnSilence = Literal["wait", "continue"]
+
+State = Enum("State", ["START", "FREEWHEEL", "READY", "WAITING"])
+"""See the table above."""
 
 
 class Lockstep:
@@ -49,12 +70,12 @@ class Lockstep:
         self._pace = None if speed is None else simulation.period / speed
         self._resend = resend
         self._on_silence = on_silence
-        self._locked = False  # the autopilot has answered: no tick without an answer from here on
+        self._state = State.START
         self._due = 0.0  # when the current tick is to be sent (again)
         self._not_before = 0.0  # with a pace: earliest start of the next tick
         self._sent_at = 0.0
         self._first_sent_at = 0.0
-        self._repeats = -1  # of the current tick; -1: not sent yet
+        self._repeats = 0  # of the current tick
         self._timer = RetransmissionTimer()
         self._last_controls: Array | None = None  # kept only to fly on with
 
@@ -78,17 +99,18 @@ class Lockstep:
             self._receiver.replies = []
         if now < self._due:
             return out
-        if not self._locked:
+        if self._state in (State.START, State.FREEWHEEL):
             self._freewheel(now)
-        elif self._repeats >= 0:
+        elif self._state is State.WAITING:
             self._repeat(now)
         if self.simulation.finished:
             return out
-        self._repeats += 1
         self._sent_at = now
         if self._repeats == 0:
             self._first_sent_at = now
-        if self._locked:
+        if self._state is State.READY:
+            self._state = State.WAITING
+        if self._state is State.WAITING:
             self._due = now + self._timer.timeout()
             if self._repeats > 0 and not self._resend:
                 return out
@@ -96,15 +118,16 @@ class Lockstep:
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the autopilot."""
-        if self._repeats == 0 and self._on_silence == "wait" and self.simulation.exchange(datagram):
+        at_once = self._state is State.WAITING and self._repeats == 0
+        if at_once and self._on_silence == "wait" and self.simulation.exchange(datagram):
             self._answered(now)
             return
         answer = self._receiver
         if not answer.receive(datagram):
             return
-        if not self._locked:
-            self._lock(now)
-        if self._repeats < 0 or answer.time_usec != self.simulation.time_usec:
+        if self._state in (State.START, State.FREEWHEEL):
+            self._heard()
+        if self._state is State.READY or answer.time_usec != self.simulation.time_usec:
             return  # a duplicate, or an answer that comes too late to matter
         if self._repeats > 0:
             self._notices.over("silence", "autopilot answers again")
@@ -117,16 +140,19 @@ class Lockstep:
 
     def _freewheel(self, now: float) -> None:
         """Until the first answer: time runs at the nominal pace, the vehicle is held."""
-        if self._repeats >= 0:
+        if self._state is State.FREEWHEEL:
             self.simulation.next_tick()
-        self._repeats = -1
+        self._state = State.FREEWHEEL
         self._due = max(self._due + self.simulation.period, now)
 
-    def _lock(self, now: float) -> None:
-        self._locked = True
+    def _heard(self) -> None:
+        """The autopilot has answered: no tick without an answer from here on."""
         self.simulation.heard()
-        if self._repeats >= 0:
+        if self._state is State.FREEWHEEL:
+            self._state = State.WAITING
             self._due = self._sent_at + self._timer.timeout()
+        else:
+            self._state = State.READY
 
     def _repeat(self, now: float) -> None:
         """No answer within the time-out: the same tick goes out again."""
@@ -135,8 +161,9 @@ class Lockstep:
         if silence and self._on_silence == "continue" and self._last_controls is not None:
             self.unanswered_ticks += 1
             self._advance(self._last_controls)
-            self._repeats = -1
+            self._state, self._repeats = State.READY, 0
             return
+        self._repeats += 1
         if silence and now - self._first_sent_at >= SILENCE_BEFORE_NOTICE:
             self._notices.once("silence", "no answer from the autopilot: the world waits for it")
         if self.simulation.started and self._resend:
@@ -152,7 +179,7 @@ class Lockstep:
         """The current tick is over, the next is due."""
         if self._repeats == 0:
             self._timer.sample(now - self._sent_at)
-        self._repeats = -1
+        self._state, self._repeats = State.READY, 0
         self._due = now
         if self._pace is not None:
             self._not_before = max(self._not_before + self._pace, now - self._pace)
