@@ -10,6 +10,7 @@ from controller.design.names import DESIGNS
 from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from sitl.command_line.argument_types import host_and_port, link_address, number, ports, whole
 from sitl.command_line.export import add_export
+from sitl.command_line.sweep import add_sweep
 from sitl.command_line.view import add_view
 from sitl.command_line.warmup import add_warmup
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
@@ -111,6 +112,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     add_export(commands)
     add_view(commands)
+    add_sweep(commands)
     add_warmup(commands)
     bench = commands.add_parser(
         "bench",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sitl.command_line.arguments import build_parser
 from sitl.command_line.export import run_export
+from sitl.command_line.sweep import run_sweep
 from sitl.command_line.view import run_view
 from sitl.command_line.warmup import run_warmup
 from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
@@ -267,6 +268,7 @@ COMMANDS = {
     "paper": _paper,
     "export": run_export,
     "view": run_view,
+    "sweep": run_sweep,
     "warmup": run_warmup,
 }
 
