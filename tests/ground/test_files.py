@@ -220,6 +220,18 @@ def test_a_request_that_comes_twice_is_answered_twice_by_the_same() -> None:
     assert first[3] == Opcode.ACK
 
 
+def test_a_client_may_choose_its_session() -> None:
+    """MAVProxy does, and takes no answer of another one."""
+    rig = Rig()
+    client = rig.client()
+    reader = Reader(client)
+    raw = reader.payload(Opcode.OPEN_FILE_RO, GENERAL, session=252)
+    client.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, raw))
+    (answer,) = reader.answers()
+    assert (answer[2], answer[3]) == (252, Opcode.ACK)
+    assert reader.ask(Opcode.READ_FILE, session=252, size=10)[0] == Opcode.ACK
+
+
 @pytest.mark.parametrize("opcode", [6, 7, 8, 9, 10, 11, 12, 13])
 def test_nothing_is_written(opcode: int) -> None:
     assert Reader(Rig().client()).error(opcode, "/log/new.json") == Error.FILE_PROTECTED

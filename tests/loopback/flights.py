@@ -173,7 +173,9 @@ def mavproxy_flight(master: str, folder: Path) -> None:
     (folder / "plan.txt").write_text(WAYPOINTS)
     proxy = MavProxy(master, folder)
     try:
-        at = proxy.wait_for("Received ")
+        at = proxy.wait_for("parameters (ftp)")
+        proxy.say("ftp list /")
+        at = proxy.wait_for("D @PARAM", after=at)
         proxy.say("param set MIS_TAKEOFF_ALT 4.5")
         time.sleep(1.0)
         proxy.say("param show MIS_TAKEOFF_ALT")

@@ -210,7 +210,10 @@ class Ftp:
         if content is None:
             return Error.FILE_NOT_FOUND
         taken = {session for owner, session in self._open if owner == client}
-        session = next(number for number in range(MOST_SESSIONS + 1) if number not in taken)
+        # MAVProxy chooses its session itself; others send 0 and take what they are given.
+        free = next(number for number in range(MOST_SESSIONS + 1) if number not in taken)
+        session = request.session or free
+        self._open.pop((client, session), None)
         while len(self._open) >= MOST_SESSIONS:
             del self._open[next(iter(self._open))]
         self._open[client, session] = content
