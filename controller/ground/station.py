@@ -90,7 +90,7 @@ class Station:
         self.profile = profile
         self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
-        self.missions = Missions(self.machine.accept_plan)
+        self.missions = Missions(self.machine.accept_plan, self.machine.go_to_item)
         standard = standard_peers(profile.instance) if peers is None else peers
         self.peers = Peers(standard, now, self._forget)
         self.datagrams = DatagramSplitter()

@@ -48,6 +48,8 @@ def test_going_to_a_point_and_pausing() -> None:
 )
 def test_points_that_cannot_be_flown_to_are_refused(params: tuple[float, ...], words: str) -> None:
     rig, client = flying()
+    rig.station.parameters.set("GF_MAX_HOR_DIST", 500.0)
+    rig.station.parameters.set("GF_MAX_VER_DIST", 120.0)
     target = rig.station.update(rig.view, rig.now)
     assert client.command(192, *params).result == DENIED
     assert words in client.texts()[-1]

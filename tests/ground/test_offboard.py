@@ -112,6 +112,7 @@ def test_a_set_point_of_the_load_is_the_loads() -> None:
 )
 def test_set_points_that_cannot_be_flown_are_refused_and_do_not_count(message: Any, words: str) -> None:
     rig, client = flying()
+    rig.station.parameters.set("GF_MAX_HOR_DIST", 500.0)
     stream(rig, client, message, 0.5)
     assert any(word in client.texts()[-1] for word in words.split("|"))
     assert client.command(176, 1, 6, 0).result == REJECTED
@@ -119,6 +120,7 @@ def test_set_points_that_cannot_be_flown_are_refused_and_do_not_count(message: A
 
 def test_set_points_that_move_outside_the_fence_are_refused_in_a_word_now_and_then() -> None:
     rig, client = flying()
+    rig.station.parameters.set("GF_MAX_HOR_DIST", 500.0)
     before = len(client.texts())
     for metres in range(100):
         client.send(local_setpoint(600 + metres, 0, -5))

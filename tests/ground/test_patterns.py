@@ -100,7 +100,8 @@ def test_an_orbit_during_take_off_waits_for_its_end() -> None:
     ],
 )
 def test_what_is_no_orbit_is_denied(params: Any, place: Any, words: str) -> None:
-    _rig, client = flying()
+    rig, client = flying()
+    rig.station.parameters.set("GF_MAX_HOR_DIST", 500.0)
     assert client.command_int(ORBIT, params, *place).result == DENIED
     assert words in client.texts()[-1]
 

@@ -302,7 +302,8 @@ def _mission_start(c: Command, machine: Machine, requests: Requests, now: float)
 def _set_item(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if not (math.isfinite(c.p1) and c.p1 == int(c.p1)):
         return deny(f"Mission item {c.p1:g} does not exist; use its number")
-    return machine.set_current_item(int(c.p1))
+    reset = c.number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT and c.p2 == 1.0
+    return machine.set_current_item(int(c.p1), reset)
 
 
 def _set_home(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:

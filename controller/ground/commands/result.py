@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 ACCEPTED: int = mavlink.MAV_RESULT_ACCEPTED
 REJECTED_FOR_NOW: int = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 DENIED: int = mavlink.MAV_RESULT_DENIED
+FAILED: int = mavlink.MAV_RESULT_FAILED
 UNSUPPORTED_FRAME = 9
 """MAV_RESULT_COMMAND_UNSUPPORTED_MAV_FRAME of the current `common` dialect"""
 UNSUPPORTED: int = mavlink.MAV_RESULT_UNSUPPORTED

@@ -34,6 +34,7 @@ from controller.ground.flight.return_home import ReturnHome
 from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
 from controller.ground.flight.trajectory import motion_pole
 from controller.ground.missions import mission_plan as plan
+from controller.ground.missions.item_types import TAKEOFF, WITH_POSITION
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
@@ -221,8 +222,8 @@ class Guidance:
         altitude = self.takeoff_height
         if self._pilot.mode is Mode.MISSION:
             items = self._mission.items
-            first = next((item for item in items if item.command in plan.WITH_POSITION), None)
-            if first is not None and first.command == plan.TAKEOFF:
+            first = next((item for item in items if item.command in WITH_POSITION), None)
+            if first is not None and first.command == TAKEOFF:
                 altitude = plan.place(first, self._profile, self.home_geodetic())[2]
         height = self.height_of_takeoff(altitude, view)
         if height > self._asked_height(altitude) + 0.01 and self.home is not None:
@@ -387,7 +388,13 @@ class Guidance:
     def _fly_mission(self, view: VehicleView) -> Target:
         hanging = self._profile.hover_length if view.load_attached else 0.0
         radius = self._parameters["NAV_ACC_RAD"]
-        step = self._mission.advance(view, lambda item: self._place(item, view), hanging, radius)
+        step = self._mission.advance(
+            view,
+            lambda item: self._place(item, view),
+            hanging,
+            radius,
+            lambda home: self.set_home_to(home[0], home[1]),
+        )
         if isinstance(step, Then):
             self._after_mission(step, view)
         else:

@@ -9,19 +9,23 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.missions.mission_plan import (
+from controller.ground.flight.region_of_interest import RegionOfInterest
+from controller.ground.missions.item_types import (
     CHANGE_SPEED,
-    DELAY,
+    DELAYS,
     JUMP,
     LAND,
     LOITER,
     LOITER_TIME,
+    PAYLOAD_PLACE,
+    POINTING,
     RETURN,
+    SET_HOME,
     TAKEOFF,
     WAYPOINT,
     WITH_POSITION,
-    Item,
 )
+from controller.ground.missions.mission_plan import Item
 from controller.ground.telemetry.vehicle_state import VehicleView
 from sitl_bridge.frames import Triple, yaw_from_heading
 
@@ -33,6 +37,7 @@ COMPLETE: int = mavlink.MISSION_STATE_COMPLETE
 
 MOST_STEPS = 1000
 """Items without a place that are passed in one go; more are a loop that goes nowhere."""
+_WITH_HEADING = (WAYPOINT, LOITER, LOITER_TIME, TAKEOFF, LAND)
 AT_REST = 0.3
 """m/s, of the load at a way-point where it is to stop"""
 
@@ -72,6 +77,7 @@ class MissionFlight:
         """m/s, that the plan asked for; NaN: the default"""
         self.reached: list[int] = []
         """Items reached and not yet announced."""
+        self.region = RegionOfInterest()
         self._jumps: dict[int, int] = {}
         self._since: float | None = None
         self._here: Triple | None = None
@@ -79,14 +85,26 @@ class MissionFlight:
         self._arrived = False
 
     def jump(self, seq: int) -> str:
-        """Go on with another item; returns why not, or an empty string."""
+        """Go on with another item; returns why not, or an empty string.
+
+        At a jump this is where the jump goes, and none of its repetitions is used up.
+        """
         if not 0 <= seq < len(self.items):
             return f"Mission item {seq} does not exist; there are {len(self.items)}"
+        while self.items[seq].command == JUMP and self.items[seq].p2 != 0:
+            seq = int(self.items[seq].p1)
         if self.state == COMPLETE:
             self.state = NOT_STARTED
         self.current = seq
         self._leave()
         return ""
+
+    def restart(self, seq: int) -> None:
+        """As at the beginning, but at an item; a flight of the plan goes on."""
+        state = self.state
+        self.replace(self.items)
+        self.current = seq
+        self.state = NOT_STARTED if state == COMPLETE else state
 
     def start(self) -> None:
         """Begin, or go on after a pause."""
@@ -101,7 +119,12 @@ class MissionFlight:
             self.state = PAUSED
 
     def advance(
-        self, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
+        self,
+        view: VehicleView,
+        place: Callable[[Item], Triple],
+        hanging: float,
+        radius: float,
+        set_home: Callable[[Triple], None],
     ) -> Waypoint | Then:
         """What to do now. `hanging`: m, the load below the vehicle (0 without); `radius`: m, the default."""
         for _ in range(MOST_STEPS):
@@ -118,6 +141,14 @@ class MissionFlight:
             elif item.command == CHANGE_SPEED:
                 self.speed = item.p2 if item.p1 in (0, 1) and item.p2 > 0 else self.speed
                 self._next()
+            elif item.command == SET_HOME:
+                set_home(view.position if item.p1 == 1 else place(item))
+                self._next()
+            elif item.command in POINTING:
+                self.region.point_at(item, self.items, place)
+                self._next()
+            elif item.command not in (*WITH_POSITION, *DELAYS):
+                self._next()
             else:
                 stay = self._fly(item, view, place, hanging, radius)
                 if stay is not None:
@@ -132,7 +163,7 @@ class MissionFlight:
         wait = 0.0
         if item.command == LOITER:
             wait = math.inf
-        elif item.command in (WAYPOINT, LOITER_TIME, DELAY) and item.p1 > 0:
+        elif item.command in (WAYPOINT, LOITER_TIME, *DELAYS) and item.p1 > 0:
             wait = item.p1
         if point is not None and not self._arrived:
             last = not any(i.command in WITH_POSITION for i in self.items[self.current + 1 :])
@@ -146,14 +177,21 @@ class MissionFlight:
             self._since = view.time if self._since is None else self._since
             if view.time - self._since >= wait:
                 return self._over(item)
-        yaw = math.nan if math.isnan(item.p4) or point is None else yaw_from_heading(math.radians(item.p4))
-        return Waypoint(point, yaw)
+        return Waypoint(point, self._yaw(item, point, view))
+
+    def _yaw(self, item: Item, point: Triple | None, view: VehicleView) -> float:
+        """rad ENU; NaN: as it is. A region of interest goes before the item's own heading."""
+        pointed = self.region.yaw(view.position, point)
+        has_heading = item.command in _WITH_HEADING and point is not None
+        if not math.isnan(pointed) or not has_heading or math.isnan(item.p4):
+            return pointed
+        return yaw_from_heading(math.radians(item.p4))
 
     def _point(self, item: Item, view: VehicleView, place: Callable[[Item], Triple]) -> Triple | None:
         """Where the vehicle has to be for an item, m ENU; None: where it is."""
         if item.has_place:
             return place(item)
-        if item.command != TAKEOFF:
+        if item.command not in (TAKEOFF, PAYLOAD_PLACE):
             return None
         if self._here is None:
             self._here = view.position

@@ -34,7 +34,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from controller.ground.commands.result import EMERGENCY, INFO, OK, WARNING, Notice, Verdict, deny, not_now
+from controller.ground.commands.result import (
+    EMERGENCY,
+    FAILED,
+    INFO,
+    OK,
+    WARNING,
+    Notice,
+    Verdict,
+    deny,
+    not_now,
+)
 from controller.ground.commands.setpoints import Offboard, Setpoint
 from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
 from controller.ground.flight.fence import Fence
@@ -47,6 +57,7 @@ from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
 from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.missions import mission_plan as plan
+from controller.ground.missions.item_types import WAYPOINT
 from controller.ground.missions.mission_plan import Fault, Item
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
@@ -335,23 +346,39 @@ class Machine:
 
     def accept_plan(self, items: tuple[Item, ...]) -> Fault | None:
         """Take a plan, or say why not."""
-        if self.armed and self.mode is Mode.MISSION:
-            return Fault(14, "it is being flown; pause it first")  # MAV_MISSION_DENIED
         fault = self.check_plan(items)
-        if fault is None:
-            self.mission.replace(items)
-            fence = self._guidance.fence()
-            low = plan.too_low(items, self.profile, self.home_geodetic(), fence)
-            if low:
-                which = ", ".join(str(index) for index in low[:5]) + (", ..." if len(low) > 5 else "")
-                least = f"{fence.least_height:.1f} m above home (LND_CLEARANCE)"
-                self.say(INFO, f"Mission items too low for the load are flown at {least}: {which}")
-        return fault
+        if fault is not None:
+            return fault
+        for text in plan.remarks(items, self.profile, self.home_geodetic(), self._guidance.fence()):
+            self.say(INFO, text)
+        self.mission.replace(items)
+        if self.armed and self.mode is Mode.MISSION:
+            if items:
+                self.mission.start()
+                self.say(INFO, "Mission replaced: flying the new one from its beginning")
+            else:
+                self.say(INFO, "Mission cleared in flight; holding")
+                self.enter(Mode.HOLD)
+        return None
 
-    def set_current_item(self, seq: int) -> Verdict:
-        """Go on with another item of the plan."""
-        fault = self.mission.jump(seq)
-        return deny(fault) if fault else OK
+    def set_current_item(self, seq: int, reset: bool = False) -> Verdict:
+        """Go on with another item of the plan, -1: the current one; `reset`: every jump counts afresh."""
+        if reset and 0 <= max(seq, 0) < len(self.mission.items):
+            self.mission.restart(self.mission.current)
+        fault = "" if seq == -1 and self.mission.items else self.mission.jump(seq)
+        return Verdict(FAILED, fault) if fault else OK
+
+    def go_to_item(self, item: Item, only_height: bool) -> Fault | None:
+        """Fly to a way-point that is no part of a plan, or to its height only."""
+        fault = plan.check((item,), self.profile, self.home_geodetic(), self._guidance.fence())
+        if fault is not None:
+            return Fault(fault.result, f"Reposition denied: {fault.text}")
+        if item.command != WAYPOINT:
+            return Fault(2, f"Reposition denied: command {item.command} is no way-point")  # UNSUPPORTED
+        x, y, z = plan.place(item, self.profile, self.home_geodetic())
+        point = (math.nan, math.nan, z) if only_height else (x, y, z)
+        verdict = self.reposition(Reposition(False, point, math.nan, math.nan), True)
+        return None if verdict.ok else Fault(14, verdict.text)  # MAV_MISSION_DENIED
 
     # Time
 

@@ -8,24 +8,33 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.fence import Fence
+from controller.ground.missions.item_types import (
+    CHANGE_SPEED,
+    DELAYS,
+    JUMP,
+    LAND,
+    LOITER_TIME,
+    PAYLOAD_PLACE,
+    RETURN,
+    ROI,
+    SET_HOME,
+    SUPPORTED,
+    TAKEOFF,
+    WAYPOINT,
+    WITH_PLACE,
+    WITH_POSITION,
+    WITHOUT_EFFECT,
+)
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple
 
-WAYPOINT: int = mavlink.MAV_CMD_NAV_WAYPOINT
-LOITER: int = mavlink.MAV_CMD_NAV_LOITER_UNLIM
-LOITER_TIME: int = mavlink.MAV_CMD_NAV_LOITER_TIME
-RETURN: int = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
-LAND: int = mavlink.MAV_CMD_NAV_LAND
-TAKEOFF: int = mavlink.MAV_CMD_NAV_TAKEOFF
-DELAY: int = mavlink.MAV_CMD_NAV_DELAY
-JUMP: int = mavlink.MAV_CMD_DO_JUMP
-CHANGE_SPEED: int = mavlink.MAV_CMD_DO_CHANGE_SPEED
-
-WITH_POSITION = (WAYPOINT, LOITER, LOITER_TIME, TAKEOFF, LAND)
-SUPPORTED = (*WITH_POSITION, RETURN, DELAY, JUMP, CHANGE_SPEED)
 AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
 MOST_ITEMS = 500
+LARGEST_SPEED = 100.0
+"""m/s, that a plan may ask for; the vehicle flies MPC_XY_VEL_MAX at most"""
+_LOCATION = 3
+"""DO_SET_ROI's param1 for a place; 0 is none, 1 the next way-point, 2 a way-point, 4 a target"""
 
 
 class Item(NamedTuple):
@@ -44,9 +53,27 @@ class Item(NamedTuple):
 
     @property
     def has_place(self) -> bool:
-        """Whether x and y name a place: take-off and landing may leave it to where the vehicle is."""
+        """Whether x and y name a place for the vehicle: some items may leave it to where the vehicle is."""
         return self.command in WITH_POSITION and not (
-            self.command in (TAKEOFF, LAND) and (self.x, self.y) == (0, 0)
+            self.command in (TAKEOFF, LAND, PAYLOAD_PLACE) and (self.x, self.y) == (0, 0)
+        )
+
+    @property
+    def names_place(self) -> bool:
+        """Whether x, y and z are a place of any meaning."""
+        if self.command == ROI:
+            return self.p1 == _LOCATION
+        if self.command == SET_HOME:
+            return self.p1 != 1
+        return self.command in WITH_PLACE
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether the plan stays at the item until something has been flown or waited for."""
+        return (
+            self.command in WITH_POSITION
+            or self.command == RETURN
+            or (self.command in DELAYS and self.p1 > 0)
         )
 
 
@@ -68,50 +95,96 @@ def place(item: Item, profile: Profile, home: Geodetic) -> Triple:
 def check(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fence) -> Fault | None:
     """The first fault of a plan, None if it can be flown."""
     for index, item in enumerate(items):
-        fault = _check_item(item, len(items), profile, home, fence)
+        fault = _check_numbers(item, len(items)) or _check_place(item, profile, home, fence)
         if fault is not None:
             return Fault(fault.result, f"Mission item {index}: {fault.text}")
+    looping = _endless_jump(items)
+    if looping is not None:
+        text = f"Mission item {looping}: the jump goes in circles without anything to fly"
+        return Fault(mavlink.MAV_MISSION_INVALID_PARAM1, text)
     return None
 
 
-def too_low(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fence) -> list[int]:
-    """Items whose altitude the hanging load forbids; they are flown as low as it allows."""
-    return [
-        index
-        for index, item in enumerate(items)
-        if item.command in WITH_POSITION
-        and item.command not in (LAND, TAKEOFF)
-        and fence.too_low(place(item, profile, home))
+def remarks(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fence) -> list[str]:
+    """What a plan that is accepted asks for in vain."""
+    idle: dict[str, list[str]] = {}
+    low = []
+    for index, item in enumerate(items):
+        if item.command in WITHOUT_EFFECT:
+            idle.setdefault(WITHOUT_EFFECT[item.command], []).append(str(index))
+        elif item.command == PAYLOAD_PLACE:
+            idle.setdefault("gripper", []).append(str(index))
+        if item.has_place and item.command not in (LAND, TAKEOFF):
+            low += [str(index)] if fence.too_low(place(item, profile, home)) else []
+    texts = [
+        f"No {what} on this vehicle: no effect of mission items {_listed(where)}"
+        for what, where in idle.items()
     ]
+    if low:
+        least = f"{fence.least_height:.1f} m above home (LND_CLEARANCE)"
+        texts.append(f"Mission items too low for the load are flown at {least}: {_listed(low)}")
+    return texts
 
 
-def _check_item(item: Item, count: int, profile: Profile, home: Geodetic, fence: Fence) -> Fault | None:
-    numbers = (item.p1, item.p2, item.p3, item.p4)
-    for place_of, number in enumerate(numbers):
-        if math.isinf(number):
-            return Fault(mavlink.MAV_MISSION_INVALID_PARAM1 + place_of, f"param{place_of + 1} is infinite")
+def _listed(indices: list[str]) -> str:
+    return ", ".join(indices[:8]) + (", ..." if len(indices) > 8 else "")
+
+
+def _check_numbers(item: Item, count: int) -> Fault | None:
+    """Command and parameters that are no place."""
     if item.command not in SUPPORTED:
         return Fault(mavlink.MAV_MISSION_UNSUPPORTED, f"command {item.command} is not supported; remove it")
-    if item.command in WITH_POSITION:
-        return _check_place(item, profile, home, fence)
-    if item.command == JUMP and not (0 <= item.p1 < count and item.p1 == int(item.p1)):
-        return Fault(mavlink.MAV_MISSION_INVALID_PARAM1, f"jump to item {item.p1:g} of {count}")
-    if item.command == JUMP and not (math.isfinite(item.p2) and item.p2 == int(item.p2) and item.p2 >= -1):
-        return Fault(
-            mavlink.MAV_MISSION_INVALID_PARAM2, f"{item.p2:g} repetitions; use -1 (for ever) or more"
-        )
-    if item.command == CHANGE_SPEED and not (item.p2 > 0 or item.p2 == -1 or math.isnan(item.p2)):
-        return Fault(
-            mavlink.MAV_MISSION_INVALID_PARAM2, f"speed {item.p2:g} m/s; use more than 0, or -1 for no change"
-        )
-    if item.command == DELAY and not (item.p1 >= 0):
-        return Fault(
-            mavlink.MAV_MISSION_INVALID_PARAM1, "delay until a time of day is not supported; use seconds"
-        )
+    if item.command in WITHOUT_EFFECT:
+        return None
+    first, second = mavlink.MAV_MISSION_INVALID_PARAM1, mavlink.MAV_MISSION_INVALID_PARAM2
+    for index, number in enumerate((item.p1, item.p2, item.p3, item.p4)):
+        if math.isinf(number):
+            return Fault(first + index, f"param{index + 1} is infinite")
+    p1, p2 = item.p1, item.p2
+    if item.command in (WAYPOINT, LOITER_TIME) and p1 < 0:
+        return Fault(first, f"wait of {p1:g} s; use 0 or more")
+    if item.command == WAYPOINT and p2 < 0:
+        return Fault(second, f"acceptance radius of {p2:g} m; use 0 or more")
+    if item.command == JUMP and not (0 <= p1 < count and p1 == int(p1)):
+        return Fault(first, f"jump to item {p1:g} of {count}")
+    if item.command == JUMP and not (math.isfinite(p2) and p2 == int(p2) and p2 >= -1):
+        return Fault(second, f"{p2:g} repetitions; use -1 (for ever) or more")
+    if item.command == CHANGE_SPEED and not (p1 in (0, 1) or math.isnan(p1)):
+        return Fault(first, f"speed of kind {p1:g} cannot be set; use 0 or 1 (horizontal)")
+    if item.command == CHANGE_SPEED and not (0 < p2 <= LARGEST_SPEED or p2 == -1 or math.isnan(p2)):
+        return Fault(second, f"speed {p2:g} m/s; use 0 to {LARGEST_SPEED:g}, or -1 for no change")
+    if item.command in DELAYS and not p1 >= 0:
+        return Fault(first, "delay until a time of day is not supported; use seconds")
+    if item.command == ROI and p1 not in (0, 1, 2, _LOCATION, 4):
+        return Fault(first, f"region of interest of kind {p1:g}; use 0 to 4")
+    if item.command == ROI and p1 == 2 and not (0 <= p2 < count and p2 == int(p2)):
+        return Fault(second, f"region of interest at item {p2:g} of {count}")
+    return None
+
+
+def _endless_jump(items: tuple[Item, ...]) -> int | None:
+    """A jump of a loop in which nothing takes time, None without one."""
+    for start, item in enumerate(items):
+        if item.command != JUMP or item.p2 == 0:
+            continue
+        seen: set[int] = set()
+        ahead = [int(item.p1)]
+        while ahead:
+            index = ahead.pop()
+            if index == start:
+                return start
+            if index in seen or index >= len(items) or items[index].takes_time:
+                continue
+            seen.add(index)
+            jumps = items[index].command == JUMP and items[index].p2 != 0
+            ahead += [int(items[index].p1)] if jumps else []
+            ahead += [] if jumps and items[index].p2 == -1 else [index + 1]
     return None
 
 
 def _check_place(item: Item, profile: Profile, home: Geodetic, fence: Fence) -> Fault | None:
+    if not item.names_place:
+        return None
     if item.frame not in AMSL_FRAMES and item.frame not in RELATIVE_FRAMES:
         return Fault(
             mavlink.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame} is not supported; use 0, 3, 5 or 6"
@@ -124,6 +197,8 @@ def _check_place(item: Item, profile: Profile, home: Geodetic, fence: Fence) -> 
         return Fault(mavlink.MAV_MISSION_INVALID_PARAM6_Y, f"longitude {item.y / DEG_E7_PER_DEG:.4f}")
     if item.command == LAND and not profile.has_ground:
         return Fault(mavlink.MAV_MISSION_UNSUPPORTED, "there is no ground to land on")
+    if item.command not in WITH_POSITION:
+        return None
     point = place(item, profile, home)
     if not item.has_place:  # above home, as far as the fence can tell before the flight
         point = (fence.home[0], fence.home[1], point[2])

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.peers import Address
-from controller.ground.missions.mission_plan import MOST_ITEMS, WITH_POSITION, Fault, Item
+from controller.ground.missions.item_types import WITH_PLACE
+from controller.ground.missions.mission_plan import MOST_ITEMS, Fault, Item
 from sitl_bridge.frames import DEG_E7_PER_DEG
 
 RETRY_INTERVAL = 0.25
@@ -22,6 +23,9 @@ RETRY_INTERVAL = 0.25
 PATIENCE = 5.0
 """s without an item, after which an upload is dropped"""
 MOST_TRANSFERS = 32
+_GO_TO = 2
+_CHANGE_HEIGHT = 3
+"""Values of an item's `current` in guided flight, as ArduPilot's clients send it"""
 
 MISSION: int = mavlink.MAV_MISSION_TYPE_MISSION
 ALL: int = mavlink.MAV_MISSION_TYPE_ALL
@@ -47,11 +51,18 @@ class _Upload:
 
 
 class Missions:
-    """The plan on board and the transfers under way. `accept` judges a complete plan and takes it."""
+    """The plan on board and the transfers under way.
 
-    def __init__(self, accept: Callable[[tuple[Item, ...]], Fault | None]) -> None:
+    `accept` judges a complete plan and takes it. `go_to` flies to the item of an older client at once,
+    or only changes to its height if the flag is true.
+    """
+
+    def __init__(
+        self, accept: Callable[[tuple[Item, ...]], Fault | None], go_to: Callable[[Item, bool], Fault | None]
+    ) -> None:
         self.items: tuple[Item, ...] = ()
         self._accept = accept
+        self._go_to = go_to
         self._uploads: dict[Client, _Upload] = {}
         self._downloads: dict[Client, tuple[Item, ...]] = {}
         self._finished: dict[Client, tuple[int, int]] = {}
@@ -112,6 +123,9 @@ class Missions:
     def _item(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         if message.mission_type != MISSION:
             return
+        if message.current in (_GO_TO, _CHANGE_HEIGHT):
+            self._guided(message, client, reply, say)
+            return
         upload = self._uploads.get(client)
         if upload is None:
             self._late_item(message.seq, client, reply)
@@ -132,6 +146,18 @@ class Missions:
         else:
             del self._uploads[client]
             self._finish(client, upload.count, tuple(upload.items), reply, say)
+
+    def _guided(self, message: Any, client: Client, reply: Reply, say: Say) -> None:
+        """An item that is no part of a plan: where to go now."""
+        item = _item_of(message)
+        fault = (
+            Fault(mavlink.MAV_MISSION_INVALID_PARAM5_X, "Reposition denied: position is no number")
+            if item is None
+            else self._go_to(item, message.current == _CHANGE_HEIGHT)
+        )
+        if fault is not None:
+            say(fault.text)
+        self._ack(client, mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result, MISSION, reply)
 
     def _late_item(self, seq: int, client: Client, reply: Reply) -> None:
         """The last item again: our acknowledgement was lost."""
@@ -235,7 +261,7 @@ def _item_of(message: Any) -> Item | None:
     """The item of MISSION_ITEM_INT or MISSION_ITEM (degrees); None if its position is no number."""
     x, y = message.x, message.y
     if message.id == mavlink.MAVLINK_MSG_ID_MISSION_ITEM:
-        scale = DEG_E7_PER_DEG if message.command in WITH_POSITION else 1.0
+        scale = DEG_E7_PER_DEG if message.command in WITH_PLACE else 1.0
         if not (abs(x) < 214 and abs(y) < 214):
             return None
         x, y = round(x * scale), round(y * scale)
@@ -253,7 +279,7 @@ def _item_int_message(item: Item, seq: int, client: Client) -> Any:
 
 def _item_message(item: Item, seq: int, client: Client) -> Any:
     to = (client.system, client.component)
-    scale = DEG_E7_PER_DEG if item.command in WITH_POSITION else 1.0
+    scale = DEG_E7_PER_DEG if item.command in WITH_PLACE else 1.0
     rest = (item.p1, item.p2, item.p3, item.p4, item.x / scale, item.y / scale, item.z, MISSION)
     return mavlink.MAVLink_mission_item_message(
         *to, seq, item.frame, item.command, 0, item.autocontinue, *rest

@@ -111,8 +111,8 @@ _USED: tuple[Parameter, ...] = (
     Parameter("BAT_CRIT_THR", 0.07, 0.01, 0.5, "", "Remaining charge (0..1) that is critical"),
     Parameter("BAT_EMERGEN_THR", 0.05, 0.0, 0.4, "", "Remaining charge (0..1) that is an emergency"),
     Parameter("GF_ACTION", 3, 0, 5, "", "Reaction when the vehicle leaves the geofence", _FENCE_ACTIONS),
-    Parameter("GF_MAX_HOR_DIST", 500.0, 0.0, 10000.0, "m", "Radius of the geofence around home; 0: none"),
-    Parameter("GF_MAX_VER_DIST", 120.0, 0.0, 10000.0, "m", "Height of the geofence above home; 0: none"),
+    Parameter("GF_MAX_HOR_DIST", 0.0, 0.0, 10000.0, "m", "Radius of the geofence around home; 0: none"),
+    Parameter("GF_MAX_VER_DIST", 0.0, 0.0, 10000.0, "m", "Height of the geofence above home; 0: none"),
     Parameter("FD_FAIL_TILT", 70.0, 30.0, 180.0, "deg", "Tilt at which the flight has failed and is terminated; 180: never"),
     # The law: factors on the weights of the integral LQR, controller/design/catalogue.py
     Parameter("LQR_Q_VPOS", 1.0, 1e-3, 1e3, "", _WEIGHT + "Position of the vehicle while it carries the load"),
