@@ -10,7 +10,7 @@ from sitl_bridge.plant.physics.battery import BatteryReading
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.sensors.gps import GpsFix
 from sitl_bridge.plant.sensors.tracker import Sighting
-from sitl_bridge.plant.stages import EVER, Stage, run
+from sitl_bridge.plant.stages import EVER, Stage, never_due, run
 from sitl_bridge.plant.wire.messages import TickWriter
 from sitl_bridge.plant.wire.slow_frames import SlowFrames
 
@@ -42,13 +42,13 @@ class Sensing:
         self._slow_frames = b""
         self._datagram = b""
         self.stages = (
-            Stage("finite state", self._check_state, lambda: EVER),
+            Stage("finite state", self._check_state, never_due),
             Stage("sensors begin afresh", self._freshen, lambda: 0 if self.due else EVER),
             Stage("instruments", self._read_instruments, lambda: world.instruments.ticks_left(self._tick)),
             Stage("GPS", self._read_gps, lambda: world.gps.ticks_left(self._tick)),
             Stage("tracker", self._read_tracker, self._tracker_ticks_left),
             Stage("slow frames", self._say_slowly, lambda: slow.ticks_left(self._tick)),
-            Stage("datagram", self._write_datagram, lambda: EVER),
+            Stage("datagram", self._write_datagram, never_due),
         )
         """In their order."""
 

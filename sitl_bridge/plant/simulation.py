@@ -26,7 +26,10 @@ from sitl_bridge.plant.stages import (
     Command,
     LoopDelay,
     Stage,
+    always_due,
+    due_rules,
     interval_ticks_left,
+    never_due,
     run,
     ticks_left,
 )
@@ -113,24 +116,23 @@ class Simulation:
         self._commands: Sequence[Command] = ()
         self._datagram: bytes | None = None
         self._ticks_left = 0  # that may be flown whole
-        self._flying = self._stages_of_flight()
-        self._stages = (*self._flying, *self._sensing.stages)
-        self._counts = [stage.count for stage in self._stages if stage.count is not None]
         self.record_with(recorder)
         self._go_to_tick(0)
 
     def _stages_of_flight(self) -> tuple[Stage, ...]:
         """From the answer to the tick's end."""
-        world = self.world
+        world, recorder = self.world, self._recorder
+        in_table = never_due if recorder is None or recorder.table is not None else always_due
+        took_row = None if recorder is None else recorder.took_row
         return (
-            Stage("loop delay", self._hold_back_command, self._delay.ticks_left),
-            Stage("commands at the start", self._start_commands, lambda: EVER),
-            Stage("row of the log", self.record, self._log_ticks_left, self._took_row),
+            Stage("loop delay", self._hold_back_command, self._delay.due_rule),
+            Stage("commands at the start", self._start_commands, never_due),
+            Stage("row of the log", self.record, in_table, took_row),
             Stage("motion", self._move, world.motion_ticks_left, world.count_tick),
-            Stage("tick count", self._count_tick, lambda: EVER, self._count_tick),
+            Stage("tick count", self._count_tick, never_due),
             Stage("battery", self._draw_on_battery, self._battery_ticks_left),
             Stage("faults", self._apply_faults, self._fault_ticks_left),
-            Stage("next tick", self.next_tick, lambda: EVER, self.next_tick),
+            Stage("next tick", self.next_tick, never_due),
             Stage("lost vehicle", self._look_for_loss, self._look_ticks_left),
             Stage("end of the scenario", self._end, self._end_ticks_left),
         )
@@ -139,6 +141,10 @@ class Simulation:
         """Have the states of the scenario kept from now on."""
         self._recorder = recorder
         self._ticks_left = 0
+        self._flying = self._stages_of_flight()
+        stages = (*self._flying, *self._sensing.stages)
+        self._due_rules = due_rules(stages)
+        self._counts = [stage.count for stage in stages if stage.count is not None]
         table = None if recorder is None else recorder.table
         self._exchange = exchange.bind(
             *self.answers.arrays,
@@ -166,7 +172,7 @@ class Simulation:
                 )
             except Diverged as error:
                 raise Diverged(f"{error} at t = {self.scenario_time:.3f} s") from None
-            self._ticks_left = ticks_left(self._stages) if self.started else 0
+            self._ticks_left = ticks_left(self._due_rules) if self.started else 0
         return self._datagram
 
     def heard(self) -> None:
@@ -258,10 +264,11 @@ class Simulation:
     def _fly_whole(self, length: int) -> bool:
         """The compiled tick on the datagram of this length, or on the commands as they are (NO_DATAGRAM)."""
         recorder, tick = self._recorder, self.tick + 1
+        next_time_usec = self._time_usec(tick)
         size = self._exchange(
             length,
             self.time_usec,
-            self._time_usec(tick),
+            next_time_usec,
             *self.world.next_steps(),
             tick - self._sensing.first_tick,
             -1 if recorder is None else recorder.count,
@@ -272,6 +279,8 @@ class Simulation:
             return False
         for count in self._counts:
             count()
+        self.tick, self.time_usec = tick, next_time_usec
+        self.ticks_flown += 1
         self._ticks_left -= 1
         self._datagram = self._writer.written(size)
         return True
@@ -279,7 +288,8 @@ class Simulation:
     # The stages of a flight.
 
     def _hold_back_command(self) -> None:
-        self._commands = [Command(c.step, self._delay.passed(c.controls)) for c in self._commands]
+        if self._delay.ticks:
+            self._commands = [Command(c.step, self._delay.passed(c.controls)) for c in self._commands]
 
     def _start_commands(self) -> None:
         for command in self._commands:
@@ -290,13 +300,6 @@ class Simulation:
         """Record the world at the current tick, with the rotors as they are commanded now."""
         if self._recorder is not None:
             self._recorder.record(self.scenario_time, self.world)
-
-    def _took_row(self) -> None:
-        if self._recorder is not None:
-            self._recorder.took_row()
-
-    def _log_ticks_left(self) -> int:
-        return EVER if self._recorder is None or self._recorder.table is not None else 0
 
     def _move(self) -> None:
         flown = 0

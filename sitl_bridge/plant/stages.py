@@ -40,9 +40,24 @@ def run(stages: Sequence[Stage]) -> None:
         stage.run()
 
 
-def ticks_left(stages: Sequence[Stage]) -> int:
+def never_due() -> int:
+    """The due rule of a stage that the compiled tick does entirely."""
+    return EVER
+
+
+def always_due() -> int:
+    """The due rule of a stage that the compiled tick cannot do."""
+    return 0
+
+
+def due_rules(stages: Sequence[Stage]) -> list[Callable[[], int]]:
+    """The rules of all stages that are ever due."""
+    return [stage.ticks_left for stage in stages if stage.ticks_left is not never_due]
+
+
+def ticks_left(rules: Sequence[Callable[[], int]]) -> int:
     """How many ticks from the current one on may be flown whole: until the first stage is due."""
-    return min(stage.ticks_left() for stage in stages)
+    return min([rule() for rule in rules], default=EVER)
 
 
 def interval_ticks_left(every: int, tick: int) -> int:
@@ -78,6 +93,7 @@ class LoopDelay:
         self._under_way.append(controls.copy())
         return self._under_way.popleft()
 
-    def ticks_left(self) -> int:
+    @property
+    def due_rule(self) -> Callable[[], int]:
         """Due at every tick, where there is a delay."""
-        return 0 if self.ticks else EVER
+        return always_due if self.ticks else never_due

@@ -16,7 +16,15 @@ from sitl_bridge.plant.clocks.realtime import Realtime
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.log.state_log import StateLog
 from sitl_bridge.plant.simulation import Simulation
-from sitl_bridge.plant.stages import EVER, Command, LoopDelay, Stage, interval_ticks_left, ticks_left
+from sitl_bridge.plant.stages import (
+    EVER,
+    Command,
+    LoopDelay,
+    Stage,
+    due_rules,
+    interval_ticks_left,
+    ticks_left,
+)
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.plant.network import Faults, Network, autopilot_session
 
@@ -34,7 +42,7 @@ def test_whole_ticks_end_before_the_first_stage_is_due(intervals: list[int], tic
         Stage(str(every), lambda: None, lambda every=every: interval_ticks_left(every, tick))  # type: ignore[misc]
         for every in intervals
     ]
-    left = ticks_left(stages)
+    left = ticks_left(due_rules(stages))
     assert all((tick + k) % every != 0 for every in intervals for k in range(1, left + 1))
     assert any((tick + left + 1) % every == 0 for every in intervals)
 
@@ -45,7 +53,7 @@ def test_a_loop_delay_keeps_the_order(ticks: int, values: list[float]) -> None:
     delay.restart(np.full(16, -1.0))
     passed = [float(delay.passed(np.full(16, value))[0]) for value in values]
     assert passed == ([-1.0] * ticks + values)[: len(values)]
-    assert delay.ticks_left() == (0 if ticks else EVER)
+    assert delay.due_rule() == (0 if ticks else EVER)
 
 
 def realtime_flight(path: Path, whole: bool, answer_delay: float) -> int:
