@@ -25,6 +25,7 @@ from controller.ground.missions import transfer as mission_protocol
 from controller.ground.missions.transfer import Client, Missions
 from controller.ground.parameters.protocol import HASH_CHECK, Parameters
 from controller.ground.telemetry import messages as telemetry
+from controller.ground.telemetry.plant_clock import PlantClock
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned, euler_from_quaternion
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame
@@ -53,6 +54,7 @@ class Inbox:
         logs: LogProtocol,
         out: Outbox,
         peers: Peers,
+        clock: PlantClock,
     ) -> None:
         self._profile = machine.profile
         self._machine = machine
@@ -63,6 +65,7 @@ class Inbox:
         self._logs = logs
         self._out = out
         self._peers = peers
+        self._clock = clock
 
     def take(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         """A message from a peer; what is for nobody here is left."""
@@ -231,8 +234,7 @@ class Inbox:
     def _time_sync(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if message.tc1 == 0:
             # On the clock of the telemetry's time stamps, so that a companion knows the age of a state.
-            view = self._machine.view
-            time = now if view is None else view.time
+            time = self._clock.read(now)
             self._out.send(peer, mavlink.MAVLink_timesync_message(int(time * 1e9), message.ts1), now)
 
     def _file_transfer(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:

@@ -34,6 +34,7 @@ from controller.ground.parameters.table import BY_NAME
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.load_relay import LoadRelay
 from controller.ground.telemetry.message_rates import Streams
+from controller.ground.telemetry.plant_clock import PlantClock
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame
 
@@ -94,6 +95,7 @@ class Station:
         standard = standard_peers(profile.instance) if peers is None else peers
         self.peers = Peers(standard, now, self._forget)
         self.datagrams = DatagramSplitter()
+        self.plant_clock = PlantClock()
         self.dropped = 0
         """Datagrams and frames that were not taken"""
         self._signing = signing
@@ -115,6 +117,7 @@ class Station:
             self._logs,
             self._out,
             self.peers,
+            self.plant_clock,
         )
         self._housekeeping = now
         self._due = now
@@ -182,6 +185,7 @@ class Station:
         of ours, and at once when something has come in.
         """
         machine = self.machine
+        self.plant_clock.note(view.time, now)
         machine.view = view
         if not self._stirred and view.time < self._next_look[0] and now < self._next_look[1]:
             return machine.target

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.setpoint_types import Attitude, Idle
+from controller.ground.telemetry.plant_clock import PlantClock
 from sitl_bridge.frames import (
     Triple,
     attitude_to_ned_frd,
@@ -21,7 +22,7 @@ from sitl_bridge.frames import (
 )
 from tests.ground.flown import Flown
 from tests.ground.in_flight import ACCEPTED, REJECTED, flying, local_setpoint, mode, stream
-from tests.ground.rig import NAN, Client, Rig
+from tests.ground.rig import NAN, TICK, Client, Rig
 
 ATTITUDE, RATES = 0b111, 0b10000000
 """Type masks of MAVSDK's set_attitude and set_attitude_rate"""
@@ -124,7 +125,18 @@ def test_time_is_that_of_the_telemetry() -> None:
     rig.run(0.02)
     (answer,) = client.got("TIMESYNC")
     assert answer.ts1 == 12345
-    assert abs(answer.tc1 * 1e-9 - rig.view.time) <= 0.021
+    assert 0.0 <= rig.view.time - answer.tc1 * 1e-9 < 2.1 * TICK  # the view was moved on twice since
+
+
+def test_time_goes_on_between_two_ticks_and_never_past_the_next() -> None:
+    clock = PlantClock()
+    assert clock.read(7.0) == 7.0  # before the first tick
+    for tick in range(3):
+        clock.note(100.0 + 0.004 * tick, 50.0 + 0.010 * tick)  # slower than real time
+    readings = [clock.read(50.020 + step) for step in (0.0, 0.001, 0.003, 0.008)]
+    assert readings == pytest.approx([100.008, 100.009, 100.011, 100.012])
+    clock.note(100.012, 50.030)
+    assert clock.read(50.030) >= readings[-1] - 1e-9
 
 
 def test_odometry_and_attitude_at_100_hz_on_request() -> None:
