@@ -23,7 +23,7 @@ from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Peer, Peers
 from controller.ground.missions import transfer as mission_protocol
 from controller.ground.missions.transfer import Client, Missions
-from controller.ground.parameters.protocol import HASH_CHECK, Parameters
+from controller.ground.parameters.protocol import HASH_CHECK, Parameters, as_own_type
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.plant_clock import PlantClock
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned, euler_from_quaternion
@@ -119,7 +119,10 @@ class Inbox:
             return
         reply, say = self._talk(frame, peer, now)
         raw = frame.payload[:4].ljust(4, b"\0")
-        if self._parameters.request_set(message.param_id, message.param_type, raw, reply, say):
+        kind = message.param_type
+        if peer.address in self._ftp.packed_readers:
+            kind, raw = as_own_type(message.param_id, kind, raw)
+        if self._parameters.request_set(message.param_id, kind, raw, reply, say):
             self._out.broadcast(self._parameters.value_message(message.param_id), now)
         elif peer.speaks_v1:
             # PARAM_ERROR does not exist in MAVLink 1: the value as it stays says the same.

@@ -220,6 +220,25 @@ def test_a_request_that_comes_twice_is_answered_twice_by_the_same() -> None:
     assert first[3] == Opcode.ACK
 
 
+def test_who_has_read_the_packed_parameters_sets_integers_as_floats() -> None:
+    """MAVProxy does; anybody else's type has to fit."""
+    rig = Rig()
+    client, other = rig.client(), rig.client(14540, link=1)
+    Reader(client).read("@PARAM/param.pck?withdefaults=1")
+    message = mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", 2.0, mavlink.MAV_PARAM_TYPE_REAL32)
+    other.send(message)
+    rig.run(0.04)
+    assert "INT32" in other.texts()[-1]
+    client.send(message)
+    rig.run(0.04)
+    assert client.texts() == []
+    assert rig.station.parameters["GF_ACTION"] == 2
+    for bad in (2.5, float("nan"), 1e20):
+        client.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", bad, 9))
+        rig.run(0.04)
+        assert "INT32" in client.texts()[-1]
+
+
 def test_a_client_may_choose_its_session() -> None:
     """MAVProxy does, and takes no answer of another one."""
     rig = Rig()

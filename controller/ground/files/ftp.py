@@ -13,7 +13,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
-from controller.ground.files.virtual import Content, VirtualFiles
+from controller.ground.files.virtual import Content, VirtualFiles, is_packed_parameters
 from controller.ground.link.peers import Address
 
 SIZE = 251
@@ -121,6 +121,8 @@ class Ftp:
         self._last: dict[Client, tuple[bytes, bytes]] = {}
         """The last request and its answer"""
         self._bursts: dict[Client, _Burst] = {}
+        self.packed_readers: set[Address] = set()
+        """Peers that have read the packed parameters: they set every one as a float, as on ArduPilot"""
 
     def receive(self, payload: bytes, client: Client, now: float) -> bytes | None:
         """A request's answer; None for what is none, and for a burst, which `to_send` has."""
@@ -141,6 +143,7 @@ class Ftp:
 
     def forget(self, peer: Address) -> None:
         """A peer is gone."""
+        self.packed_readers.discard(peer)
         for key in [key for key in self._open if key[0].peer == peer]:
             del self._open[key]
         for client in [client for client in (*self._last, *self._bursts) if client.peer == peer]:
@@ -209,6 +212,8 @@ class Ftp:
         content = self._files.open(request.path)
         if content is None:
             return Error.FILE_NOT_FOUND
+        if is_packed_parameters(request.path):
+            self.packed_readers.add(client.peer)
         taken = {session for owner, session in self._open if owner == client}
         # MAVProxy chooses its session itself; others send 0 and take what they are given.
         free = next(number for number in range(MOST_SESSIONS + 1) if number not in taken)

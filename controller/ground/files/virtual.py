@@ -73,6 +73,11 @@ class VirtualFiles:
         return sizes | {f"{LOG_FOLDER}/{log.name}": log.size for log in self._logs.logs()}
 
 
+def is_packed_parameters(path: str) -> bool:
+    """Whether a path is that of the packed parameters."""
+    return _normal(path.partition("?")[0]) == PARAMETERS
+
+
 def _of_bytes(content: bytes) -> Content:
     return Content(len(content), lambda offset, size: content[offset : offset + size])
 

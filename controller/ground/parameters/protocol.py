@@ -201,6 +201,17 @@ class Parameters:
         return min((due for _, due in self._lists.values()), default=math.inf)
 
 
+def as_own_type(name: str, kind: int, raw: bytes) -> tuple[int, bytes]:
+    """Type and bytes of a value that a client sends as a float whatever the parameter is."""
+    p = BY_NAME.get(name)
+    value = struct.unpack("<f", raw)[0]
+    if p is None or not p.is_integer or kind != mavlink.MAV_PARAM_TYPE_REAL32:
+        return kind, raw
+    if not abs(value) < 2**31 or value != int(value):
+        return kind, raw
+    return int(mavlink.MAV_PARAM_TYPE_INT32), struct.pack("<i", int(value))
+
+
 def _inside(p: Parameter, value: float) -> bool:
     """Within the range, whose ends count although they are no float32 numbers."""
     return bool(single(p.minimum) <= value <= single(p.maximum))
