@@ -1,4 +1,4 @@
-"""Draws docs/images/drag.png: a load dragged and lifted, in the flight of tests/plant/test_ground_flight.py.
+"""Draws docs/images/drag.png: a drag and a lift, as tests/plant/physics/test_ground_flight.py flies them.
 
 python scripts/drag_picture.py
 """
@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from sitl_bridge.plant.physics.state import LOAD_GROUND_FORCE, TENSION  # noqa: E402
-from tests.plant.test_ground_flight import PERIOD, flown  # noqa: E402
+from tests.plant.physics.test_ground_flight import PERIOD, flown  # noqa: E402
 
 
 def main() -> None:

@@ -20,8 +20,8 @@ from sitl_bridge.plant.physics.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from tests.physics.stepping import STEP, Array, derivative, fly
-from tests.physics.vehicles import Case, cases
+from tests.plant.physics.stepping import STEP, Array, derivative, fly
+from tests.plant.physics.vehicles import Case, cases
 
 DURATION = 0.5
 STEPS = round(DURATION / STEP)

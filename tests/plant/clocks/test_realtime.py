@@ -10,8 +10,8 @@ from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.plant.clocks.realtime import AUTOPILOT_TIMEOUT, Realtime
 from sitl_bridge.plant.log.notices import Notices
+from tests.plant.clocks.test_lockstep import Scripted
 from tests.plant.network import Faults, Network, autopilot_session, paper, simulation
-from tests.plant.test_lockstep import Scripted
 
 
 class Flight:

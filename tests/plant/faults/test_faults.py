@@ -364,7 +364,7 @@ def test_a_delay_before_the_first_command_leaves_a_vehicle_standing() -> None:
 
 
 def test_the_page_shows_every_failure_of_every_sensor() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "faults.md").read_text(encoding="utf-8")
     for sensor in get_args(SensorFault.model_fields["sensor"].annotation):
         for failure in FAILURES:
             if failure != "lost" or sensor == "gps":

@@ -11,7 +11,7 @@ from sitl_bridge.plant.physics.parameters import parameters
 from sitl_bridge.plant.physics.state import LOAD_POSITION, VEHICLE_POSITION, initial_state
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speed
 from sitl_bridge.vehicle.files import load_vehicle
-from tests.physics.stepping import Array, arrays, fields, fly, padded, rotor_speeds
+from tests.plant.physics.stepping import Array, arrays, fields, fly, padded, rotor_speeds
 
 
 def hover(vehicle: Vehicle, duration: float, every: int = 1) -> Array:

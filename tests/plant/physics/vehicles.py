@@ -20,7 +20,7 @@ from sitl_bridge.plant.physics.state import (
 )
 from sitl_bridge.vehicle.description import Rotor, Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
-from tests.physics.stepping import Array
+from tests.plant.physics.stepping import Array
 
 
 class Case(NamedTuple):

@@ -8,7 +8,7 @@ from sitl.studies.paper import independent_simulation
 from sitl_bridge.plant.physics.parameters import parameters
 from sitl_bridge.plant.physics.state import ATTITUDE, LOAD_POSITION, VEHICLE_POSITION, initial_state
 from sitl_bridge.vehicle.files import load_vehicle
-from tests.physics.stepping import Array, fly, rotor_speeds
+from tests.plant.physics.stepping import Array, fly, rotor_speeds
 
 DURATION = 10.0
 SAMPLE_STEPS = 100
