@@ -10,6 +10,7 @@ from pymavlink.dialects.v20.common import MAVLINK_MSG_ID_LANDING_TARGET
 
 from controller.design.model import rotor_time_constant
 from controller.estimator.filter import Estimator
+from controller.estimator.records import X_LOAD, X_POSITION
 from controller.estimator.tuning import Tuning, from_sensors
 from controller.feedback.health_notices import HealthWatch
 from controller.feedback.log import EstimateLog
@@ -45,6 +46,8 @@ LOST_TILT, LOST_POSITION = 0.35, 30.0
 _PARTS = 16
 """Late measurements belong to the nearest sixteenth of a tick: the wire's microseconds are rounded, and how
 depends on when the plant was started."""
+LARGE_START_OFFSET = 1.0
+"""m between the estimated load and its described start, beyond which the law is spared the step."""
 _LEAST_STD = 0.005
 """m; no tracker is taken for better."""
 _FIX_3D = 3
@@ -142,6 +145,8 @@ class EstimateFeedback:
         for frame in tick.others:
             if frame.message_id == MAVLINK_MSG_ID_LANDING_TARGET:
                 self._see_load(decode(frame))
+        if not self._flown and estimator.held and self._vehicle.initial.start == "hover":
+            self._begin_at_described_start()
         estimate = estimator.tick(self._tick / self._rate_hz)
         if self.guessing or (estimator.in_flight and not self._flown and not self.ready()):
             return None
@@ -211,6 +216,17 @@ class EstimateFeedback:
             return False
         health = self.estimator.health()
         return health.attitude and health.velocity and health.position
+
+    def _begin_at_described_start(self) -> None:
+        """Spread a large offset of the estimate out, as after a GPS outage.
+
+        The reference begins at the described start of the load. A receiver that is metres off would make the
+        first deviation a step of metres, which turns the vehicle over.
+        """
+        nominal = self.estimator.nominal
+        load = nominal[X_POSITION : X_POSITION + 3] + nominal[X_LOAD : X_LOAD + 3]
+        offset = load - np.array(self._vehicle.initial.load_position)
+        self.estimator.hide_offset(offset if np.linalg.norm(offset) > LARGE_START_OFFSET else np.zeros(3))
 
     def _guess(self, specific_force: float, time_usec: int) -> None:
         """Flying or standing: specific_force: m/s², along body z, the rotors being stopped."""
