@@ -273,9 +273,16 @@ COMMANDS = {
 }
 
 
+def help_as_flag(argv: Sequence[str]) -> list[str]:
+    """Return the arguments with `help [COMMAND]` as `[COMMAND] --help`; no arguments ask for help, too."""
+    if not argv:
+        return ["--help"]
+    return [*argv[1:], "--help"] if argv[0] == "help" else list(argv)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    arguments = build_parser().parse_args(argv)
+    arguments = build_parser().parse_args(help_as_flag(sys.argv[1:] if argv is None else argv))
     try:
         code = COMMANDS[arguments.command](arguments)
     except DescriptionError as error:
