@@ -22,7 +22,8 @@ from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Peer, Peers
 from controller.ground.missions import transfer as mission_protocol
-from controller.ground.missions.transfer import Client, Missions
+from controller.ground.missions.plans import Plans
+from controller.ground.missions.transfer import Client
 from controller.ground.parameters.protocol import HASH_CHECK, Parameters, as_own_type
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.plant_clock import PlantClock
@@ -48,7 +49,7 @@ class Inbox:
         self,
         machine: Machine,
         parameters: Parameters,
-        missions: Missions,
+        missions: Plans,
         commands: CommandService,
         ftp: Ftp,
         logs: LogProtocol,

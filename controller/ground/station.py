@@ -26,7 +26,7 @@ from controller.ground.link.packing import CurrentMode, Packed, decoded, packed
 from controller.ground.link.peers import Address, Peers
 from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
 from controller.ground.link.signing import Signing
-from controller.ground.missions.transfer import Missions
+from controller.ground.missions.plans import Plans
 from controller.ground.parameters.file import ParameterFile
 from controller.ground.parameters.protocol import Parameters, single
 from controller.ground.parameters.storage import StoredParameters
@@ -91,7 +91,12 @@ class Station:
         self.profile = profile
         self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
-        self.missions = Missions(self.machine.accept_plan, self.machine.go_to_item)
+        self.missions = Plans(
+            self.machine.accept_plan,
+            self.machine.accept_fence,
+            self.machine.accept_rally,
+            self.machine.go_to_item,
+        )
         standard = standard_peers(profile.instance) if peers is None else peers
         self.peers = Peers(standard, now, self._forget)
         self.datagrams = DatagramSplitter()

@@ -133,6 +133,37 @@ def test_any_messages_in_flight(seed: int) -> None:
     assert client.got("HEARTBEAT")
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_random_plans_of_likely_items(seed: int) -> None:
+    """Whatever is uploaded is answered once, and what is accepted can be flown or flown under."""
+    generator = random.Random(2000 + seed)
+    of_mission = [16, 17, 19, 20, 21, 22, 31, 93, 94, 112, 177, 178, 179, 195, 196, 197, 201, 211]
+    commands = [of_mission, [5000, 5001, 5002, 5003, 5004], [5100]]
+    rig = Rig()
+    client = rig.client()
+    rig.fly(client)
+    for _ in range(60):
+        kind, count = generator.randrange(3), generator.randrange(1, 6)
+        client.clear()
+        client.send(mavlink.MAVLink_mission_count_message(1, 1, count, kind))
+        for seq in range(count):
+            numbers = [generator.choice([*SPICE, 3.0, 4.0]) for _ in range(4)]
+            x, y = (centre + generator.randrange(-20000, 20000) for centre in (473977420, 85455940))
+            command = generator.choice(commands[kind])
+            fields = (seq, 6, command, generator.choice((0, 1)), 1, *numbers, x, y)
+            z = generator.choice([*SPICE, 5.0, 8.0])
+            client.send(mavlink.MAVLink_mission_item_int_message(1, 1, *fields, z, kind))
+        rig.run(0.04)
+        assert len(client.got("MISSION_ACK")) == 1
+        client.command(300, 0, 0)
+        rig.run(generator.choice((0.02, 1.0)))
+    client.clear()
+    client.send(mavlink.MAVLink_ping_message(1, 77, 0, 0))
+    rig.run(1.5)
+    assert client.got("PING")
+    assert client.got("HEARTBEAT")
+
+
 def test_random_commands_with_likely_numbers() -> None:
     generator = random.Random(5)
     rig = Rig()

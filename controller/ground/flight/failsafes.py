@@ -126,7 +126,7 @@ def _slow(
         ("battery critical", left < p["BAT_CRIT_THR"]),
         ("battery emergency", left < p["BAT_EMERGEN_THR"]),
         ("station", gone and p.integer("NAV_DLL_ACT") != 0),
-        ("fence", p.integer("GF_ACTION") != 0 and bool(fence.outside(view.position))),
+        ("fence", p.integer("GF_ACTION") != 0 and bool(_outside(view, fence))),
     )
 
 
@@ -174,9 +174,17 @@ def _station(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
     return Trigger(reaction, WARNING, f"No ground station for {p['COM_DL_LOSS_T']:g} s: {_word(reaction)}")
 
 
+def _outside(view: VehicleView, fence: Fence) -> str:
+    """Which body is outside the geofence, and how; empty if none is."""
+    if fault := fence.outside(view.position):
+        return f"Vehicle {fault}"
+    fault = fence.outside(view.load_position) if view.load_attached else ""
+    return f"Load {fault}" if fault else ""
+
+
 def _geofence(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
     reaction = _FENCE.get(p.integer("GF_ACTION"), Reaction.NONE)
-    return Trigger(reaction, CRITICAL, f"Vehicle {fence.outside(view.position)}: {_word(reaction)}")
+    return Trigger(reaction, CRITICAL, f"{_outside(view, fence)}: {_word(reaction)}")
 
 
 def _battery(severity: int, word: str, reactions: dict[int, Reaction]) -> _Maker:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from controller.ground.flight.fence_zones import Zone
+from controller.ground.flight.fence_zones import outside as outside_zones
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import Triple
@@ -21,6 +23,8 @@ class Fence(NamedTuple):
     least_height: float
     """m above home for a vehicle with a hanging load; -inf where there is no ground"""
 
+    zones: tuple[Zone, ...] = ()
+
     def outside(self, point: Triple) -> str:
         """Why a position is outside the geofence, or an empty string."""
         distance = math.hypot(point[0] - self.home[0], point[1] - self.home[1])
@@ -31,7 +35,7 @@ class Fence(NamedTuple):
         above = point[2] - self.home[2]
         if self.height > 0 and not above <= self.height:
             return f"{above:.0f} m above home is outside the geofence of {self.height:g} m (GF_MAX_VER_DIST)"
-        return ""
+        return outside_zones(self.zones, point[:2])
 
     def too_low(self, point: Triple) -> str:
         """Why the load would touch the ground with the vehicle at a position, or an empty string."""
@@ -46,7 +50,13 @@ class Fence(NamedTuple):
         return (point[0], point[1], max(point[2], self.home[2] + self.least_height))
 
 
-def fence_around(home: Triple, parameters: Parameters, profile: Profile, with_load: bool = True) -> Fence:
+def fence_around(
+    home: Triple,
+    parameters: Parameters,
+    profile: Profile,
+    with_load: bool = True,
+    zones: tuple[Zone, ...] = (),
+) -> Fence:
     """The fence of the parameters."""
     hanging = profile.hover_length + parameters["LND_CLEARANCE"] if with_load else parameters["LND_CLEARANCE"]
     return Fence(
@@ -54,4 +64,5 @@ def fence_around(home: Triple, parameters: Parameters, profile: Profile, with_lo
         parameters["GF_MAX_HOR_DIST"],
         parameters["GF_MAX_VER_DIST"],
         hanging if profile.has_ground else -math.inf,
+        zones,
     )

@@ -16,6 +16,7 @@ from controller.ground.flight.ascent import Ascent, Step
 from controller.ground.flight.descent import Descent
 from controller.ground.flight.descent import Step as DescentStep
 from controller.ground.flight.fence import Fence, fence_around
+from controller.ground.flight.fence_zones import Place, Zone
 from controller.ground.flight.follow_target import FollowTarget
 from controller.ground.flight.geometry import (
     above,
@@ -30,7 +31,7 @@ from controller.ground.flight.geometry import (
 from controller.ground.flight.mission_flight import MissionFlight, Then
 from controller.ground.flight.patterns import Orbit, Pattern, Yaw
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
-from controller.ground.flight.return_home import ReturnHome
+from controller.ground.flight.return_home import ReturnHome, nearest_rally_point
 from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
 from controller.ground.flight.trajectory import motion_pole
 from controller.ground.missions import mission_plan as plan
@@ -86,6 +87,9 @@ class Guidance:
         """m ENU, of the vehicle, that a take-off was asked for; NaN: by MIS_TAKEOFF_ALT"""
         self.speed = math.nan
         """m/s, horizontal, that was asked for; NaN: the default"""
+        self.zones: tuple[Zone, ...] = ()
+        """Of the geofence"""
+        self.rally_points: tuple[Place, ...] = ()
         self.landed_at = -math.inf
         """s of the plant's time, when the last landing was over"""
         self._profile = profile
@@ -129,7 +133,7 @@ class Guidance:
 
     def fence(self, with_load: bool = True) -> Fence:
         """The limits around home."""
-        return fence_around(self.home_or_origin, self._parameters, self._profile, with_load)
+        return fence_around(self.home_or_origin, self._parameters, self._profile, with_load, self.zones)
 
     def set_home(self, view: VehicleView) -> None:
         """Home is here, or where somebody has put it; its height is where the vehicle is."""
@@ -364,9 +368,14 @@ class Guidance:
 
     def _return_home(self, view: VehicleView) -> Target:
         if self._return is None:
-            self._return = ReturnHome(self.home_or_origin, self._home_load, self._point)
+            home, load = self.home_or_origin, self._home_load
+            rally = nearest_rally_point(self.rally_points, view.position, home, self._parameters)
+            if rally is not None:
+                home, load = (*rally, home[2]), (*rally, load[2])
+                self._pilot.say(INFO, "Returning to the nearest rally point")
+            self._return = ReturnHome(home, load, self._point, None if rally is not None else home)
         if self._return.arrived(view, self._parameters, self._profile):
-            self._land(view, self._return.place(view), self.home_or_origin)
+            self._land(view, self._return.place(view), self._return.stand)
         self._stay_at(self._return.point, controlled_body(view))
         return self._hold(view)
 

@@ -59,6 +59,7 @@ from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import WAYPOINT
 from controller.ground.missions.mission_plan import Fault, Item
+from controller.ground.missions.zones import rally_points_of, zones_of
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Geodetic, Triple
@@ -183,7 +184,9 @@ class Machine:
         self.terminated = False
         self.mode = Mode.HOLD
         self.target = Idle(False)
+        before = self._guidance
         self._guidance = Guidance(self.profile, self.parameters, self.mission, self)
+        self._guidance.zones, self._guidance.rally_points = before.zones, before.rally_points
         self.mission.replace(self.mission.items)
         self.say(INFO, "Rebooted")
 
@@ -359,6 +362,22 @@ class Machine:
             else:
                 self.say(INFO, "Mission cleared in flight; holding")
                 self.enter(Mode.HOLD)
+        return None
+
+    def accept_fence(self, items: tuple[Item, ...]) -> Fault | None:
+        """Take a geofence, or say why not."""
+        zones = zones_of(items, self.profile.origin)
+        if isinstance(zones, Fault):
+            return zones
+        self._guidance.zones = zones
+        return None
+
+    def accept_rally(self, items: tuple[Item, ...]) -> Fault | None:
+        """Take rally points, or say why not."""
+        points = rally_points_of(items, self.profile.origin)
+        if isinstance(points, Fault):
+            return points
+        self._guidance.rally_points = points
         return None
 
     def set_current_item(self, seq: int, reset: bool = False) -> Verdict:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
+from controller.ground.flight.fence_zones import Place
 from controller.ground.flight.geometry import above
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
@@ -22,10 +23,22 @@ class Step(Enum):
     WAIT = auto()
 
 
+def nearest_rally_point(points: tuple[Place, ...], here: Triple, home: Triple, p: Parameters) -> Place | None:
+    """East and north (m) of the rally point to return to, by RTL_TYPE; None: home."""
+    kind = p.integer("RTL_TYPE")
+    if kind not in (0, 1, 3) or not points:
+        return None
+    nearest = min(points, key=lambda place: math.dist(place, here[:2]))
+    nearer = math.dist(nearest, here[:2]) < math.dist(home[:2], here[:2])
+    return nearest if kind == 1 or nearer else None
+
+
 class ReturnHome:
     """One way back, of the load if there is one, else of the vehicle; it begins at `point` (m)."""
 
-    def __init__(self, home: Triple, home_load: Triple, point: Triple) -> None:
+    def __init__(self, home: Triple, home_load: Triple, point: Triple, stand: Triple | None) -> None:
+        self.stand = stand
+        """m, where the vehicle is to stand after the landing; None: beside the load"""
         self.point = point
         """m, where the controlled body is to go now"""
         self.step = Step.CLIMB

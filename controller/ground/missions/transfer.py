@@ -28,7 +28,9 @@ _CHANGE_HEIGHT = 3
 """Values of an item's `current` in guided flight, as ArduPilot's clients send it"""
 
 MISSION: int = mavlink.MAV_MISSION_TYPE_MISSION
-ALL: int = mavlink.MAV_MISSION_TYPE_ALL
+FENCE: int = mavlink.MAV_MISSION_TYPE_FENCE
+RALLY: int = mavlink.MAV_MISSION_TYPE_RALLY
+_NAMES = {MISSION: "Mission", FENCE: "Geofence", RALLY: "Rally points"}
 
 Reply = Callable[[Any], None]
 Say = Callable[[str], None]
@@ -58,8 +60,13 @@ class Missions:
     """
 
     def __init__(
-        self, accept: Callable[[tuple[Item, ...]], Fault | None], go_to: Callable[[Item, bool], Fault | None]
+        self,
+        accept: Callable[[tuple[Item, ...]], Fault | None],
+        go_to: Callable[[Item, bool], Fault | None],
+        kind: int = MISSION,
     ) -> None:
+        self._kind = kind
+        self._name = _NAMES[kind]
         self.items: tuple[Item, ...] = ()
         self._accept = accept
         self._go_to = go_to
@@ -78,37 +85,31 @@ class Missions:
 
     def _request_list(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         kind = message.mission_type
-        items = self.items if kind == MISSION else ()
-        if kind == MISSION:
-            self._downloads.pop(client, None)
-            if len(self._downloads) >= MOST_TRANSFERS:
-                del self._downloads[next(iter(self._downloads))]
-            self._downloads[client] = items
+        items = self.items
+        self._downloads.pop(client, None)
+        if len(self._downloads) >= MOST_TRANSFERS:
+            del self._downloads[next(iter(self._downloads))]
+        self._downloads[client] = items
         reply(mavlink.MAVLink_mission_count_message(client.system, client.component, len(items), kind))
 
     def _request(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         kind = message.mission_type
-        items = self._downloads.get(client, self.items) if kind == MISSION else ()
+        items = self._downloads.get(client, self.items)
         if message.seq >= len(items):
-            say(f"Mission item {message.seq} does not exist; there are {len(items)}")
+            say(f"{self._name} item {message.seq} does not exist; there are {len(items)}")
             self._ack(client, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind, reply)
         elif message.id == mavlink.MAVLINK_MSG_ID_MISSION_REQUEST:
-            reply(_item_message(items[message.seq], message.seq, client))
+            reply(_item_message(items[message.seq], message.seq, client, self._kind))
         else:
-            reply(_item_int_message(items[message.seq], message.seq, client))
+            reply(_item_int_message(items[message.seq], message.seq, client, self._kind))
 
     # Upload
 
     def _count(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         kind = message.mission_type
         self._finished.pop(client, None)
-        if kind != MISSION:
-            what = {1: "Geofence plans", 2: "Rally points"}.get(kind, f"Plans of type {kind}")
-            hint = "; the geofence is GF_MAX_HOR_DIST and GF_MAX_VER_DIST" if kind == 1 else ""
-            say(f"{what} are not supported{hint}")
-            self._ack(client, mavlink.MAV_MISSION_UNSUPPORTED, kind, reply)
-        elif message.count > MOST_ITEMS:
-            say(f"Mission of {message.count} items is too long; at most {MOST_ITEMS}")
+        if message.count > MOST_ITEMS:
+            say(f"{self._name} of {message.count} items is too long; at most {MOST_ITEMS}")
             self._ack(client, mavlink.MAV_MISSION_NO_SPACE, kind, reply)
         elif message.count == 0:
             self._uploads.pop(client, None)
@@ -121,8 +122,6 @@ class Missions:
             self._ask(client, reply)
 
     def _item(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
-        if message.mission_type != MISSION:
-            return
         if message.current in (_GO_TO, _CHANGE_HEIGHT):
             self._guided(message, client, reply, say)
             return
@@ -136,8 +135,8 @@ class Missions:
         item = _item_of(message)
         if item is None:
             del self._uploads[client]
-            say(f"Mission item {message.seq}: position is no number")
-            self._ack(client, mavlink.MAV_MISSION_INVALID_PARAM5_X, MISSION, reply)
+            say(f"{self._name} item {message.seq}: position is no number")
+            self._ack(client, mavlink.MAV_MISSION_INVALID_PARAM5_X, self._kind, reply)
             return
         upload.items.append(item)
         upload.last_item = upload.last_request = now
@@ -157,45 +156,45 @@ class Missions:
         )
         if fault is not None:
             say(fault.text)
-        self._ack(client, mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result, MISSION, reply)
+        self._ack(client, mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result, self._kind, reply)
 
     def _late_item(self, seq: int, client: Client, reply: Reply) -> None:
         """The last item again: our acknowledgement was lost."""
         count, result = self._finished.get(client, (0, 0))
         if count and seq == count - 1:
-            self._ack(client, result, MISSION, reply)
+            self._ack(client, result, self._kind, reply)
 
     def _finish(self, client: Client, count: int, items: tuple[Item, ...], reply: Reply, say: Say) -> None:
         fault = self._accept(items)
         if fault is None:
             self.items = items
         else:
-            say(f"Mission denied: {fault.text}")
+            say(f"{self._name} denied: {fault.text}")
         result = mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result
         while len(self._finished) >= MOST_TRANSFERS:
             del self._finished[next(iter(self._finished))]
         self._finished[client] = (count, result)
-        self._ack(client, result, MISSION, reply)
+        self._ack(client, result, self._kind, reply)
 
     def _acknowledged(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         """MISSION_ACK ends a download; with anything but ACCEPTED it also takes an upload back."""
-        if message.mission_type == MISSION:
-            self._downloads.pop(client, None)
-            if message.type != mavlink.MAV_MISSION_ACCEPTED:
-                self._uploads.pop(client, None)
+        self._downloads.pop(client, None)
+        if message.type != mavlink.MAV_MISSION_ACCEPTED:
+            self._uploads.pop(client, None)
 
     def _clear(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
-        kind = message.mission_type
-        result = mavlink.MAV_MISSION_ACCEPTED
-        if kind in (MISSION, ALL):
-            self._uploads.pop(client, None)
-            fault = self._accept(())
-            if fault is None:
-                self.items = ()
-            else:
-                say(f"Mission not cleared: {fault.text}")
-                result = fault.result
-        self._ack(client, result, kind, reply)
+        fault = self.clear(client)
+        if fault is not None:
+            say(f"{self._name} not cleared: {fault.text}")
+        self._ack(client, mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result, self._kind, reply)
+
+    def clear(self, client: Client) -> Fault | None:
+        """Have no items any more, or say why not."""
+        self._uploads.pop(client, None)
+        fault = self._accept(())
+        if fault is None:
+            self.items = ()
+        return fault
 
     def _partial(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         say("Parts of a mission cannot be written; upload all of it")
@@ -203,7 +202,7 @@ class Missions:
 
     def _ask(self, client: Client, reply: Reply) -> None:
         seq = len(self._uploads[client].items)
-        reply(mavlink.MAVLink_mission_request_int_message(client.system, client.component, seq, MISSION))
+        reply(mavlink.MAVLink_mission_request_int_message(client.system, client.component, seq, self._kind))
 
     def _ack(self, client: Client, result: int, kind: int, reply: Reply) -> None:
         reply(mavlink.MAVLink_mission_ack_message(client.system, client.component, result, kind))
@@ -220,7 +219,7 @@ class Missions:
                 text = f"Mission upload stopped at item {got}; nothing has changed"
                 cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
                 message = mavlink.MAVLink_mission_ack_message(
-                    client.system, client.component, cancelled, MISSION
+                    client.system, client.component, cancelled, self._kind
                 )
                 out.append((client, message, text))
             elif now - upload.last_request >= RETRY_INTERVAL:
@@ -269,18 +268,18 @@ def _item_of(message: Any) -> Item | None:
     return Item(message.frame, message.command, message.autocontinue, *p, x, y, message.z)
 
 
-def _item_int_message(item: Item, seq: int, client: Client) -> Any:
+def _item_int_message(item: Item, seq: int, client: Client, kind: int) -> Any:
     to = (client.system, client.component)
-    rest = (item.p1, item.p2, item.p3, item.p4, item.x, item.y, item.z, MISSION)
+    rest = (item.p1, item.p2, item.p3, item.p4, item.x, item.y, item.z, kind)
     return mavlink.MAVLink_mission_item_int_message(
         *to, seq, item.frame, item.command, 0, item.autocontinue, *rest
     )
 
 
-def _item_message(item: Item, seq: int, client: Client) -> Any:
+def _item_message(item: Item, seq: int, client: Client, kind: int) -> Any:
     to = (client.system, client.component)
     scale = DEG_E7_PER_DEG if item.command in WITH_PLACE else 1.0
-    rest = (item.p1, item.p2, item.p3, item.p4, item.x / scale, item.y / scale, item.z, MISSION)
+    rest = (item.p1, item.p2, item.p3, item.p4, item.x / scale, item.y / scale, item.z, kind)
     return mavlink.MAVLink_mission_item_message(
         *to, seq, item.frame, item.command, 0, item.autocontinue, *rest
     )

@@ -88,6 +88,7 @@ _USED: tuple[Parameter, ...] = (
     Parameter("FLW_TGT_MAX_VEL", 5.0, 0.0, 20.0, "m/s", "Largest speed around the target, when it turns"),
     # Return
     Parameter("RTL_RETURN_ALT", 6.0, 1.0, 150.0, "m", "Height above home on the way back"),
+    Parameter("RTL_TYPE", 0, 0, 5, "", "Where to return to; 0 or 3: home or a nearer rally point, 1: the nearest rally point, else home"),
     Parameter("RTL_MIN_DIST", 3.0, 0.0, 100.0, "m", "Nearer to home than this, the vehicle does not climb to RTL_RETURN_ALT first"),
     Parameter("RTL_LAND_DELAY", 0.0, -1.0, 300.0, "s", "Wait above home before landing; -1: stay there"),
     # Arming
