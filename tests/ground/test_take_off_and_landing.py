@@ -104,6 +104,7 @@ def test_take_off_to_nowhere_is_refused(altitude: float) -> None:
     rig = Rig()
     client = rig.client()
     rig.run(0.1)
+    rig.station.parameters.set("GF_MAX_VER_DIST", 120.0)
     assert client.command(22, *(NAN,) * 6, altitude).result == DENIED
     assert "Take-off denied" in client.texts()[-1]
 
