@@ -198,14 +198,19 @@ class EstimateFeedback:
             self._log.record((self._tick - self._first_flown) / self._rate_hz, self.estimator)
 
     def path_from(self, path_from: PathFrom) -> PathFrom:
-        """From where the description has the load at the start, which no sensor shows as well.
+        """To where the description has the load at the start, which no sensor shows as well.
 
-        In flight, from where the estimate has it.
+        The motion begins where the estimate has the load, metres away with some receivers: to begin elsewhere
+        would be a step. In flight, all of it is from where the estimate has it.
         """
         start = self._vehicle.initial_load_position
 
         def make(load: Triple) -> Path:
-            return path_from(load if self.estimator.in_flight else start)
+            if self.estimator.in_flight:
+                return path_from(load)
+            path = path_from(start)
+            path["start"] = load
+            return path
 
         return make
 
