@@ -178,7 +178,7 @@ class Estimation(Section):
 
     load_wind: bool = quantity("-", "a slowly varying force on the load, N", False)
     load_mass: bool = quantity(
-        "-", "the load's mass, of which the description's is then a first guess", False
+        "-", "the load's mass, of which the description's is then a first guess", True
     )
 
 
