@@ -243,8 +243,11 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     return record
 
 
-USUAL_WIND = 3.0
-"""m/s, standard deviation: nobody tells the filter the wind, but that there may be one."""
+USUAL_WIND = 6.0
+"""m/s, standard deviation: nobody tells the filter the wind, but that there may be one.
+
+Where less is expected, twelve m/s that come at once are taken for a swing of the load: `heavy` turned over.
+"""
 WIND_TIME = 3.0
 """s, in which the wind's force on the vehicle changes."""
 MOST_SUBSTEPS = 4
