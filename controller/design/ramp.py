@@ -14,7 +14,7 @@ import numpy as np
 
 from controller.law.reference import SMOOTH_STEP, Path
 from controller.law.state import Array
-from sitl_bridge.vehicle.description import Vehicle, rotor_effect
+from sitl_bridge.vehicle.description import Drag, Vehicle, rotor_effect
 
 LARGEST_TILT = math.radians(25.0)
 """Of the vehicle along the ramp, rad."""
@@ -66,15 +66,16 @@ def planned(path: Path, vehicle: Vehicle) -> Path:
 
 def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Demand:
     """What the path asks for over the times (n,), s, evenly spaced, if its ramp takes `ramp_time` s."""
-    load, acceleration = _motion(path, ramp_time, times)
+    load, velocity, acceleration = _motion(path, ramp_time, times)
     gravity = np.array([0.0, 0.0, vehicle.gravity])
-    pull = vehicle.load.mass * (acceleration + gravity)
+    pull = vehicle.load.mass * (acceleration + gravity) + _drag(vehicle.load.drag, velocity)
     tension = np.linalg.norm(pull, axis=1)
     length = vehicle.cable.rest_length + tension / vehicle.cable.stiffness
     position = load + (length / np.maximum(tension, 1e-9))[:, None] * pull
     spacing = times[1] - times[0]
     own = (position[2:] - 2.0 * position[1:-1] + position[:-2]) / spacing**2
-    force = vehicle.airframe.mass * (own + gravity) + pull[1:-1]
+    drag = _drag(vehicle.airframe.drag, (position[2:] - position[:-2]) / (2.0 * spacing))
+    force = vehicle.airframe.mass * (own + gravity) + pull[1:-1] + drag
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), force[:, 2])
     return Demand(float(tilt.max()), _rotor_share(vehicle, force, float(spacing)), float(pull[:, 2].min()))
 
@@ -94,6 +95,12 @@ def _rotor_share(vehicle: Vehicle, force: Array, spacing: float) -> float:
     given = np.linalg.pinv(rotor_effect(vehicle.rotors)) @ wrench
     most = np.array([rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors])
     return float((given / most[:, None]).max())
+
+
+def _drag(drag: Drag, velocity: Array) -> Array:
+    """Force (n, 3), N, against the drag of a body at velocities (n, 3), m/s, in still air."""
+    speed = np.linalg.norm(velocity, axis=1)
+    return np.asarray((drag.linear + drag.quadratic * speed)[:, None] * velocity)
 
 
 def _second(values: Array, spacing: float) -> Array:
@@ -120,8 +127,8 @@ def _available(vehicle: Vehicle) -> float:
     return sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
 
 
-def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array]:
-    """Position (n, 3), m, and acceleration, m/s², of the feasible path at the times (n,)."""
+def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:
+    """Position (n, 3), m, velocity and acceleration of the feasible path at the times (n,)."""
     radius, rate = float(path["radius"][0]), float(path["angular_rate"][0])
     away = []
     for order in range(3):
@@ -131,7 +138,11 @@ def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array]:
     start = path["start"][0]
     away[0] = away[0] + path["centre"][0] - start
     if ramp_time <= 0.0:
-        return start + away[0], away[2]
+        return start + away[0], away[1], away[2]
     share = np.clip(times / ramp_time, 0.0, 1.0)
     w = [derivative(share)[:, None] / ramp_time**order for order, derivative in enumerate(_SMOOTH_STEP)]
-    return start + w[0] * away[0], w[2] * away[0] + 2.0 * w[1] * away[1] + w[0] * away[2]
+    return (
+        start + w[0] * away[0],
+        w[1] * away[0] + w[0] * away[1],
+        w[2] * away[0] + 2.0 * w[1] * away[1] + w[0] * away[2],
+    )

@@ -2,6 +2,7 @@
 
 The load's position is a flat output: its acceleration says how hard and which way the cable pulls, hence
 where the vehicle is; the vehicle's acceleration says how hard and which way it thrusts, hence its attitude.
+Both count their drag in still air: any wind is left to the integrator.
 The attitude's own acceleration says what moments that takes. Gains scale with the inertia, so even a small
 one counts. Time derivatives along the path are central differences over a few milliseconds, exact to the
 path's own smoothness.
@@ -45,22 +46,26 @@ BODY = np.dtype(
         ("stiffness", "f8"),
         ("damping", "f8"),
         ("rest_length", "f8"),
+        ("vehicle_drag", "f8", 2),  # N s/m and N s²/m²
+        ("load_drag", "f8", 2),
     ]
 )
 
 
 def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
     """What the feed-forward needs to know of a vehicle, with its load or alone, SI units."""
-    cable = vehicle.cable
+    cable, airframe, load = vehicle.cable, vehicle.airframe, vehicle.load
     record = np.zeros(1, dtype=BODY)
     record[0] = (
         vehicle.gravity,
-        vehicle.airframe.mass,
-        vehicle.airframe.inertia,
-        vehicle.load.mass if loaded else 0.0,
+        airframe.mass,
+        airframe.inertia,
+        load.mass if loaded else 0.0,
         cable.stiffness,
         cable.damping,
         cable.rest_length,
+        (airframe.drag.linear, airframe.drag.quadratic),
+        (load.drag.linear, load.drag.quadratic),
     )
     out: np.void = record[0]
     return out
@@ -78,11 +83,15 @@ def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
             pull[i] = 0.0
         return
     squared, slope = 0.0, 0.0
+    speed = math.sqrt(r[1, 0] ** 2 + r[1, 1] ** 2 + r[1, 2] ** 2)
+    drag = b.load_drag[0] + b.load_drag[1] * speed
+    along = r[1, 0] * r[2, 0] + r[1, 1] * r[2, 1] + r[1, 2] * r[2, 2]
+    gaining = b.load_drag[1] * along / speed if speed > 0.0 else 0.0  # the drag coefficient's derivative
     for i in range(3):
         upward = r[2, i] + (b.gravity if i == 2 else 0.0)
-        pull[i] = b.load_mass * upward
+        pull[i] = b.load_mass * upward + drag * r[1, i]
         squared += pull[i] * pull[i]
-        slope += pull[i] * b.load_mass * r[3, i]
+        slope += pull[i] * (b.load_mass * r[3, i] + drag * r[2, i] + gaining * r[1, i])
     tension = math.sqrt(squared)
     # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
     stretch = tension / b.stiffness - b.damping * (slope / tension) / b.stiffness**2
@@ -103,10 +112,15 @@ def _lean(b: Any, path: Any, t: float, heading: Array, stencil: Any) -> None:
         feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
         _hang(b, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
     for j in range(1, POINTS - 1):
+        squared = 0.0
+        for i in range(3):
+            squared += (stencil.vehicle[j + 1, i] - stencil.vehicle[j - 1, i]) ** 2
+        drag = b.vehicle_drag[0] + b.vehicle_drag[1] * math.sqrt(squared) / (2.0 * h)
         for i in range(3):
             before, here, after = stencil.vehicle[j - 1, i], stencil.vehicle[j, i], stencil.vehicle[j + 1, i]
             acceleration = (before - 2.0 * here + after) / (h * h)
-            stencil.force[j, i] = b.vehicle_mass * acceleration + stencil.pull[j, i]
+            resistance = drag * (after - before) / (2.0 * h)
+            stencil.force[j, i] = b.vehicle_mass * acceleration + stencil.pull[j, i] + resistance
         stencil.force[j, 2] += b.vehicle_mass * b.gravity
         east, north, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
         x, y = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east

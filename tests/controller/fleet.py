@@ -21,8 +21,12 @@ def sized(
     stiffness: float,
     damping: float,
     time_constant: float = 0.0,
+    drag: tuple[float, float] = (0.0, 0.0),
 ) -> Vehicle:
-    """A cross of four rotors (kg, kg, kg m², m, N/m, N s/m, s), each good for twice hover thrust."""
+    """A cross of four rotors, each good for twice hover thrust.
+
+    Units: kg, kg, kg m², m, N/m, N s/m, s; drag of vehicle and load, linear and quadratic, N s/m and N s²/m².
+    """
     thrust_coefficient = (mass + load) * 9.81 / 4.0 / HOVER_SPEED**2
     overrides = [
         f"airframe.mass={mass}",
@@ -32,6 +36,8 @@ def sized(
         f"cable.stiffness={stiffness}",
         f"cable.damping={damping}",
     ]
+    for of in ("airframe", "load"):
+        overrides += [f"{of}.drag.linear={drag[0]}", f"{of}.drag.quadratic={drag[1]}"]
     for rotor in range(4):
         overrides += [
             f"rotors.{rotor}.thrust_coefficient={thrust_coefficient}",
@@ -47,6 +53,7 @@ FLEET: dict[str, Vehicle] = {
     "paper, 10 m": load_vehicle("paper", ["cable.rest_length=10"]),
     "small": sized(1.5, 0.3, (0.03, 0.03, 0.055), 1.5, 200.0, 0.5),
     "small, lag": sized(1.5, 0.3, (0.03, 0.03, 0.055), 1.5, 60.0, 0.5, time_constant=0.02),
+    "small, drag": sized(1.5, 0.3, (0.03, 0.03, 0.055), 1.5, 200.0, 0.5, drag=(0.1, 0.05)),
     "tiny, heavy load": sized(0.5, 0.5, (0.003, 0.003, 0.005), 0.5, 50.0, 0.3),
     "large": sized(15.0, 6.0, (0.6, 0.6, 1.0), 8.0, 500.0, 10.0),
     "large, lag": sized(19.5, 8.0, (1.3, 1.3, 2.3), 8.0, 500.0, 10.0, time_constant=0.06),

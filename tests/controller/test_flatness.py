@@ -29,7 +29,7 @@ PATHS = {
     "3 m": setpoint((3.0, 0.0, 0.0), ORIGIN),
     "V.C": circle((0.0, 0.0, 5.0), 5.0, 1.0, ORIGIN),
 }
-NAMES = ("paper", "paper, 10 m", "small", "large", "tiny, heavy load", "long")
+NAMES = ("paper", "paper, 10 m", "small", "small, drag", "large", "tiny, heavy load", "long")
 
 
 def flat(vehicle: Vehicle, path: Path, t: float, lead: float = 0.0) -> tuple[Array, Array]:

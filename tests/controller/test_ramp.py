@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from controller.design.catalogue import design
 from controller.design.ramp import LARGEST_TILT, LEAST_TENSION, demand, planned
 from controller.law.flatness import STENCIL, body, flat_motion
-from controller.law.reference import setpoint
+from controller.law.reference import circle, setpoint
 from controller.law.state import EULER_ANGLES, STATE_SIZE
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
@@ -67,9 +67,10 @@ def test_a_planned_step_keeps_the_limits(
     assert asked.tension >= 0.99 * LEAST_TENSION * vehicle.load.mass * vehicle.gravity
 
 
-def test_the_demand_is_the_feed_forwards() -> None:
+@pytest.mark.parametrize("drag", ["", "airframe.drag.quadratic=3", "load.drag.quadratic=3"])
+def test_the_demand_is_the_feed_forwards(drag: str) -> None:
     """Tilt and thrust along V.B, worked out by `law.flatness` with its own differences."""
-    vehicle = on_cable(10.0)
+    vehicle = load_vehicle("paper", ["cable.rest_length=10", *([drag] if drag else [])])
     path = planned(setpoint((3.0, 5.0, 2.0), ORIGIN), vehicle)
     ramp_time = float(path["ramp_time"][0])
     record = path.view(np.recarray)[0]
@@ -100,3 +101,14 @@ def test_a_weak_vehicle_takes_longer() -> None:
     weak = load_vehicle("paper", [f"rotors.{i}.max_speed=24.0" for i in range(4)])
     path = setpoint((10.0, 0.0, 5.0), ORIGIN)
     assert planned(path, weak)["ramp_time"][0] > planned(path, on_cable(1.0))["ramp_time"][0]
+
+
+def test_drag_is_fed_forward() -> None:
+    """At 5.5 m/s drag is a sixth of the vehicle's weight; not fed forward, the load is 0.3 m off."""
+    vehicle = load_vehicle(
+        "iris", ["initial.start=hover", "initial.load_position=[0, 0, 50]", "cable.rest_length=3"]
+    )
+    path = planned(circle((0.0, 0.0, 50.0), 5.0, 1.1, (0.0, 0.0, 50.0)), vehicle)
+    flight = fly(vehicle, design("default", vehicle, 250.0), path, 25.0, 250.0)
+    assert flight.metrics["tracking_rms_m"] is not None
+    assert flight.metrics["tracking_rms_m"] < 1e-3
