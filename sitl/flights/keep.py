@@ -31,13 +31,13 @@ def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath) -> None:
 
     vehicle: as the controller was told; path: the reference that was flown.
     """
-    write_vehicle(out, vehicle)
     try:
         times = read_columns(out / STATES_NAME)["time_s"]
     except RecordingError:
         return
     if len(times) < 2:
         return
+    write_vehicle(out, vehicle)
     kept = np.unique(np.append(times[::REFERENCE_EVERY], times[-1]))
     write_reference(out, kept, reference_positions(path, kept))
     recording = read_recording(out)
