@@ -243,7 +243,7 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     return record
 
 
-USUAL_WIND = 6.0
+USUAL_WIND = 5.0
 """m/s, standard deviation: nobody tells the filter the wind, but that there may be one.
 
 Where less is expected, twelve m/s that come at once are taken for a swing of the load: `heavy` turned over.
