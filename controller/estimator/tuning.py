@@ -307,6 +307,6 @@ def initial_std(vehicle: Vehicle, tuning: Tuning) -> Any:
     std[PARTS["load_velocity"]] = 0.2
     std[PARTS["force"]] = 0.5
     std[PARTS["load_wind"]] = 0.05 * vehicle.load.mass * vehicle.gravity if tuning.estimate_load_wind else 0.0
-    std[PARTS["load_mass"]] = 0.1 if tuning.estimate_load_mass else 0.0
+    std[PARTS["load_mass"]] = 0.3 if tuning.estimate_load_mass else 0.0
     std[PARTS["mag_bias"]] = tuning.magnetometer_bias_std
     return std

@@ -177,7 +177,9 @@ class Estimation(Section):
     """What an estimator is to find out besides its usual state; see docs/estimator.md."""
 
     load_wind: bool = quantity("-", "a slowly varying force on the load, N", False)
-    load_mass: bool = quantity("-", "the load's mass, of which the description's is then a first guess", True)
+    load_mass: bool = quantity(
+        "-", "the load's mass, of which the description's is then a first guess", False
+    )
 
 
 class Home(Section):
