@@ -109,6 +109,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="one JSON object on standard output at the end"
     )
     controller.add_argument("--out", metavar="DIR", type=Path, help="where to write the estimate's log")
+    _over(controller)
 
     add_export(commands)
     add_view(commands)
@@ -233,6 +234,32 @@ def _loop(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_RATE_HZ,
         help=f"ticks a second; the controller is designed for it (default: {DEFAULT_RATE_HZ:g})",
     )
+
+
+def _over(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group(
+        "over a flight stack", "fly the load while PX4 or ArduPilot flies the vehicle"
+    )
+    group.add_argument(
+        "--over",
+        metavar="ADDRESS",
+        type=link_address,
+        help="the stack's MAVLink, as udpin:127.0.0.1:14540; instead of the HIL link",
+    )
+    group.add_argument(
+        "--load",
+        choices=("truth", "position", "none"),
+        default="none",
+        help="where the load is known from: the plant's truth, its own GLOBAL_POSITION_INT, or no sensor "
+        "(default: none)",
+    )
+    group.add_argument(
+        "--truth-from",
+        metavar="ADDRESS",
+        type=link_address,
+        help="with --load truth: where the plant's --truth-to sends (default: udpin:127.0.0.1:19410)",
+    )
+    group.add_argument("--stack", metavar="FILE", type=Path, help="lags, delay and thrust of the stack, TOML")
 
 
 def _control(parser: argparse.ArgumentParser) -> None:

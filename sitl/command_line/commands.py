@@ -156,6 +156,10 @@ def _controller(arguments: argparse.Namespace) -> int:
     from sitl.flights.hold import check_design
     from sitl.flights.scenario import GroundControl, Hover, usual_feedback
 
+    if arguments.over is not None:
+        from sitl.command_line.over import run_over
+
+        return run_over(arguments, vehicle, scenario)
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)

@@ -40,9 +40,9 @@ from sitl_bridge.plant.physics.state import (
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.wire.slow_frames import load_heartbeat
 
-INTERVAL = 1.0 / 30.0
-"""s between two datagrams."""
-HEARTBEAT_EVERY = 30
+INTERVAL = 1.0 / 125.0
+"""s between two datagrams: a companion flies on them."""
+HEARTBEAT_EVERY = 125
 """Datagrams."""
 _LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 _NAN21 = [float("nan")] + [0.0] * 20

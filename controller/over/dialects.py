@@ -1,0 +1,99 @@
+"""What differs on the wire from PX4 to ArduCopter: modes, take-off, who streams what.
+
+PX4: measured on PX4 SITL. ArduCopter: after its documentation; not tried on a real one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from pymavlink.dialects.v20 import common as mavlink
+
+_CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+
+
+class ModeNumbers(NamedTuple):
+    """Parameters 2 and 3 of DO_SET_MODE, and HEARTBEAT.custom_mode."""
+
+    main: int
+    sub: int
+    custom: int
+
+
+def _px4(main: int, sub: int) -> ModeNumbers:
+    return ModeNumbers(main, sub, main << 16 | sub << 24)
+
+
+def _arducopter(number: int) -> ModeNumbers:
+    return ModeNumbers(number, 0, number)
+
+
+class Dialect(NamedTuple):
+    """One stack's conventions."""
+
+    name: str
+    offboard: ModeNumbers
+    """The mode that takes attitude and rate set-points."""
+    hold: ModeNumbers
+    """The stack holds the vehicle by itself."""
+    land: ModeNumbers
+    takeoff_mode: ModeNumbers | None
+    """The mode to be in before arming and take-off; None: the take-off command sets it."""
+    relative_takeoff: bool
+    """Whether NAV_TAKEOFF's altitude is above home, not above the sea."""
+    thrust_parameter: str | None
+    """Parameter with the curve from set-point to force."""
+
+
+PX4 = Dialect(
+    name="PX4",
+    offboard=_px4(6, 0),
+    hold=_px4(4, 3),
+    land=_px4(4, 6),
+    takeoff_mode=None,
+    relative_takeoff=False,
+    thrust_parameter="THR_MDL_FAC",
+)
+ARDUCOPTER = Dialect(
+    name="ArduCopter",
+    offboard=_arducopter(4),  # GUIDED
+    hold=_arducopter(17),  # BRAKE: LOITER needs a remote control
+    land=_arducopter(9),
+    takeoff_mode=_arducopter(4),
+    relative_takeoff=True,
+    thrust_parameter="MOT_THST_EXPO",
+)
+DIALECTS = {"px4": PX4, "ardupilot": ARDUCOPTER}
+
+
+def set_mode(system: int, numbers: ModeNumbers) -> mavlink.MAVLink_command_long_message:
+    """DO_SET_MODE."""
+    parameters = (float(_CUSTOM), float(numbers.main), float(numbers.sub), 0.0, 0.0, 0.0, 0.0)
+    return command(system, mavlink.MAV_CMD_DO_SET_MODE, *parameters)
+
+
+def arm(system: int) -> mavlink.MAVLink_command_long_message:
+    """COMPONENT_ARM_DISARM, to arm."""
+    return command(system, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def take_off(system: int, altitude: float) -> mavlink.MAVLink_command_long_message:
+    """NAV_TAKEOFF where the vehicle stands; altitude in m, above what the dialect says."""
+    nan = math.nan
+    return command(system, mavlink.MAV_CMD_NAV_TAKEOFF, nan, 0.0, 0.0, nan, nan, nan, altitude)
+
+
+def message_interval(system: int, message_id: int, rate_hz: float) -> mavlink.MAVLink_command_long_message:
+    """SET_MESSAGE_INTERVAL."""
+    interval = 1e6 / rate_hz
+    return command(
+        system, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, float(message_id), interval, 0.0, 0.0, 0.0, 0.0, 0.0
+    )
+
+
+def command(system: int, number: int, *parameters: float) -> mavlink.MAVLink_command_long_message:
+    """COMMAND_LONG to the stack's autopilot."""
+    return mavlink.MAVLink_command_long_message(
+        system, mavlink.MAV_COMP_ID_AUTOPILOT1, number, 0, *parameters
+    )

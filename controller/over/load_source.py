@@ -1,0 +1,152 @@
+"""Where the load is, by what there is: the plant's truth, its own position messages, or no sensor at all.
+
+Each source makes the law's state (18,), eq. 31, from the stack's telemetry and what it hears itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Protocol
+
+import numpy as np
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.law.state import (
+    BODY_RATES,
+    EULER_ANGLES,
+    LOAD_POSITION,
+    LOAD_VELOCITY,
+    STATE_SIZE,
+    VEHICLE_POSITION,
+    VEHICLE_VELOCITY,
+    Array,
+)
+from controller.over.pendulum_filter import PendulumFilter
+from controller.over.telemetry import Telemetry, VehicleState
+from sitl_bridge.frames import (
+    CENTIMETRES_PER_METRE,
+    DEG_E7_PER_DEG,
+    MILLIMETRES_PER_METRE,
+    Geodetic,
+    attitude_to_enu_flu,
+    enu_to_ned,
+    euler_from_quaternion,
+    flu_to_frd,
+    rotate,
+)
+from sitl_bridge.ids import COMPONENT_LOAD
+from sitl_bridge.mavlink.framing import Frame, decode
+from sitl_bridge.vehicle.description import Vehicle
+
+LOAD_GPS_DEVIATION = 0.5
+"""m, of the load's own position messages."""
+MOST_TRUTH_AGE = 0.2
+"""s"""
+
+
+class LoadSource(Protocol):
+    """Knows the load beside the stack's vehicle."""
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """Anything that a link brings, the truth's link included."""
+
+    def state(self, telemetry: Telemetry, now: float) -> Array | None:
+        """The law's state (18,) at the stack's newest state; None while there is none to fly on."""
+
+
+def law_state(vehicle: VehicleState) -> Array:
+    """The vehicle's part of eq. 31 (18,)."""
+    out = np.zeros(STATE_SIZE)
+    out[VEHICLE_POSITION], out[VEHICLE_VELOCITY] = vehicle.position, vehicle.velocity
+    out[BODY_RATES] = vehicle.rates
+    out[EULER_ANGLES] = euler_from_quaternion(vehicle.attitude)
+    return out
+
+
+class TruthSource:
+    """The plant's ODOMETRY of vehicle and load (`sitl plant --truth-to`)."""
+
+    def __init__(self) -> None:
+        self._vehicle: VehicleState | None = None
+        self._load: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+        self._at = -math.inf
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """ODOMETRY of the load, and of the vehicle by the plant's own component."""
+        if frame.message_id != mavlink.MAVLINK_MSG_ID_ODOMETRY:
+            return
+        message: Any = decode(frame)
+        place = enu_to_ned((message.x, message.y, message.z))
+        if frame.component == COMPONENT_LOAD:
+            self._load = (place, enu_to_ned((message.vx, message.vy, message.vz)))
+        elif frame.component == mavlink.MAV_COMP_ID_ONBOARD_COMPUTER:
+            attitude = attitude_to_enu_flu(tuple(message.q))
+            velocity = rotate(attitude, flu_to_frd((message.vx, message.vy, message.vz)))
+            rates = flu_to_frd((message.rollspeed, message.pitchspeed, message.yawspeed))
+            self._vehicle = VehicleState(message.time_usec * 1e-6, place, velocity, attitude, rates)
+            self._at = now
+
+    def state(self, telemetry: Telemetry, now: float) -> Array | None:
+        """Vehicle and load as the plant has them."""
+        if self._vehicle is None or self._load is None or now - self._at > MOST_TRUTH_AGE:
+            return None
+        out = law_state(self._vehicle)
+        out[LOAD_POSITION], out[LOAD_VELOCITY] = self._load
+        return out
+
+
+class FilteredSource:
+    """The pendulum filter on the stack's state and HIGHRES_IMU, with the load's own position if asked for."""
+
+    def __init__(self, vehicle: Vehicle, uses_position: bool) -> None:
+        self._vehicle = vehicle
+        self._uses_position = uses_position
+        self._filter: PendulumFilter | None = None
+        self._time: float | None = None
+        self._heard: list[Any] = []
+
+    def hear(self, frame: Frame, now: float) -> None:
+        """GLOBAL_POSITION_INT of the load, where it is to be used."""
+        position = frame.message_id == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+        if self._uses_position and position and frame.component == COMPONENT_LOAD:
+            self._heard.append(decode(frame))
+
+    def state(self, telemetry: Telemetry, now: float) -> Array | None:
+        """The vehicle as the stack has it, the load as the filter has it."""
+        vehicle = telemetry.vehicle
+        if vehicle is None:
+            return None
+        if self._filter is None or self._time is None or not 0.0 <= vehicle.time_s - self._time < 1.0:
+            self._filter = PendulumFilter(self._vehicle, vehicle.position, vehicle.velocity)
+        else:
+            self._filter.predict(vehicle.position, vehicle.velocity, vehicle.time_s - self._time)
+        self._time = vehicle.time_s
+        if telemetry.imu:
+            sample = telemetry.imu[-1]
+            telemetry.imu.clear()
+            self._filter.feel(vehicle.attitude, vehicle.position, vehicle.velocity, sample.specific_force)
+        self._take_positions(telemetry)
+        out = law_state(vehicle)
+        out[LOAD_POSITION], out[LOAD_VELOCITY] = self._filter.state[0:3], self._filter.state[3:6]
+        return out
+
+    def _take_positions(self, telemetry: Telemetry) -> None:
+        heard, self._heard = self._heard, []
+        for message in heard[-1:]:
+            point = Geodetic(
+                message.lat / DEG_E7_PER_DEG,
+                message.lon / DEG_E7_PER_DEG,
+                message.alt / MILLIMETRES_PER_METRE,
+            )
+            place = telemetry.local(point)
+            if place is not None and self._filter is not None:
+                speeds = (message.vx, message.vy, message.vz)
+                north, east, down = (v / CENTIMETRES_PER_METRE for v in speeds)
+                self._filter.see(place, LOAD_GPS_DEVIATION, enu_to_ned((north, east, down)))
+
+
+def load_source(kind: str, vehicle: Vehicle) -> LoadSource:
+    """The source of this name: truth, position or none."""
+    if kind == "truth":
+        return TruthSource()
+    return FilteredSource(vehicle, uses_position=kind == "position")

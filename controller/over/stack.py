@@ -1,0 +1,67 @@
+"""What the companion has to know of a flight stack: how fast it follows, what its thrust means, its modes.
+
+The defaults are those measured on PX4 SITL. `sitl identify` measures a stack and writes a file like this.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import DescriptionError
+from sitl_bridge.vehicle.schema import Section, quantity
+
+
+class Stack(Section):
+    """A flight stack as the companion's model has it."""
+
+    kind: Literal["px4", "ardupilot"] = quantity("-", "whose modes and conventions it has", "px4")
+    rate_lag: float = quantity(
+        "s", "first-order lag of the body rates behind their set-points", 0.06, gt=0, le=1
+    )
+    thrust_lag: float = quantity("s", "first-order lag of the thrust behind its set-point", 0.05, gt=0, le=1)
+    delay: float = quantity("s", "dead time of link and loop, before the lags", 0.02, ge=0, le=0.5)
+    full_thrust: float | None = quantity(
+        "N", "at a set-point of 1; None: all rotors at full speed", None, gt=0
+    )
+    thrust_curve: float | None = quantity(
+        "-",
+        "f of force = full·s², set-point = f·s² + (1 - f)·s: 1 is linear in force, 0 in rotor speed; None: "
+        "the stack's own parameter",
+        None,
+        ge=0,
+        le=1,
+    )
+
+
+def full_thrust(vehicle: Vehicle, stack: Stack) -> float:
+    """N at a thrust set-point of 1."""
+    if stack.full_thrust is not None:
+        return stack.full_thrust
+    return sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+
+
+def thrust_setpoint(force: float, full: float, curve: float) -> float:
+    """Thrust set-point, 0 to 1, that gives `force` (N); `full` (N) and `curve` as in `Stack`."""
+    signal = math.sqrt(min(1.0, max(0.0, force / full)))
+    return curve * signal * signal + (1.0 - curve) * signal
+
+
+def read_stack(file: Path) -> Stack:
+    """A stack from a TOML file; raises DescriptionError with a line for each fault."""
+    try:
+        return Stack.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise DescriptionError(
+            str(file), [f"{error.strerror}; expected a file that `sitl identify` wrote"]
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise DescriptionError(str(file), [str(error)]) from None
+    except ValidationError as error:
+        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
+        raise DescriptionError(str(file), lines) from None
