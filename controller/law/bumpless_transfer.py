@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from controller.law.control_law import Design, Memory, Work
@@ -22,16 +24,17 @@ def from_wrench(after: Design, achieved: Array, new: Memory) -> None:
     new["past"][0] = under_way
 
 
-def other_gains(before: Design, after: Design, memory: Memory, work: Work) -> None:
+def other_gains(before: Design, after: Design, memory: Memory, work: Work, yaw: float) -> None:
     """From one set of gains to another for the same body: the integral becomes what gives the same wrench.
 
     It has the three degrees of freedom that a constant disturbance has; what the heading needs is left over.
     """
     missing = _without_integral(before, memory, work) - _without_integral(after, memory, work)
-    to_frame = work["frame"][0]
-    integral = to_frame @ memory["integral"][0]
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    to_heading = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    integral = to_heading @ memory["integral"][0]
     wanted = before["integral_gain"][0] @ integral + missing
-    memory["integral"][0] = to_frame.T @ (np.linalg.pinv(after["integral_gain"][0]) @ wanted)
+    memory["integral"][0] = to_heading.T @ (np.linalg.pinv(after["integral_gain"][0]) @ wanted)
 
 
 def _without_integral(design: Design, memory: Memory, work: Work) -> Array:

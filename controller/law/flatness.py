@@ -187,12 +187,10 @@ def flat_motion(
     if not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h:  # at rest
         feasible(path, t, stencil.derivatives, stencil.smooth_step)
         _hang(b, stencil.derivatives, stencil.load[2], stencil.vehicle[2], stencil.pull[2])
-        weight = (b.vehicle_mass + b.load_mass) * b.gravity
         for i in range(3):
             state[i] = stencil.vehicle[2, i]
             state[3 + i] = stencil.load[2, i]
-            stencil.force[2, i] = weight if i == 2 else 0.0
-        wrench[0], wrench[1], wrench[2], wrench[3] = weight, 0.0, 0.0, 0.0
+        wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
         return
     _lean(b, path, t + lead, heading, stencil)
     wrench[0] = stencil.thrust[2]

@@ -319,7 +319,8 @@ class GuidedAutopilot:
             return
         before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
         if self._law is not None:
+            yaw = float(self._trajectory.path["yaw"][0])
             after = self._designs[self._law]
-            handover.other_gains(before[self._law], after, self._memory, self._work)
+            handover.other_gains(before[self._law], after, self._memory, self._work, yaw)
             self._step = self._bound(self._law)
         self.station.announce(Notice(INFO, "New weights fly"), self._heard)
