@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 
 from sitl_bridge.frames import rotate
-from sitl_bridge.plant.physics.state import ATTITUDE, VEHICLE_POSITION, Array
+from sitl_bridge.plant.physics.state import ATTITUDE, BODY_RATES, VEHICLE_POSITION, Array
 from sitl_bridge.vehicle.description import Vehicle
 
 FAR = 5000.0
 """m from where the vehicle started, beyond which nobody flies a scenario."""
+TUMBLING = 5.0
+"""rad/s, of roll and pitch: tilted and turning so fast, a vehicle is between two looks at it upside down."""
 GRACE = 3.0
 """s that a flight goes on after its vehicle is lost: what happened is in the log."""
 LOOK_INTERVAL = 0.1
@@ -19,7 +21,10 @@ LOOK_INTERVAL = 0.1
 def is_lost(vehicle: Vehicle, x: Array) -> bool:
     """Whether the vehicle of state x (19,) does not come back by itself."""
     w, qx, qy, qz = x[ATTITUDE].tolist()
-    if rotate((w, qx, qy, qz), (0.0, 0.0, 1.0))[2] < 0.0:
+    upright = rotate((w, qx, qy, qz), (0.0, 0.0, 1.0))[2]
+    roll_rate, pitch_rate, _ = x[BODY_RATES].tolist()
+    tumbles = math.hypot(roll_rate, pitch_rate) > TUMBLING and upright < 0.7
+    if upright < 0.0 or tumbles:
         return True
     east, north, up = x[VEHICLE_POSITION].tolist()
     start = vehicle.initial_vehicle_position
