@@ -18,6 +18,7 @@ from controller.law.reference import Path as ReferencePath
 from sitl.flights.in_process import InProcessFlight, fly_in_process
 from sitl.flights.metrics import flight_metrics, reference_positions
 from sitl.flights.outcome import judge
+from sitl.flights.refusals import check_feasible
 from sitl.flights.report import PROMISED, draw, read_state_log, write_report
 from sitl.flights.scenario import (
     GroundControl,
@@ -100,6 +101,7 @@ def fly(
     if described.faults.link:
         raise DescriptionError(str(scenario), ["faults.link takes two processes with a link between them"])
     told, flown = _vehicles(described, vehicle, overrides, plant_overrides)
+    check_feasible(described, told, design)
     feedback = feedback or usual_feedback(described, told)
     folder = None if out is None else Path(out)
     ended = fly_in_process(

@@ -20,6 +20,8 @@ LARGEST_TILT = math.radians(25.0)
 """Of the vehicle along the ramp, rad."""
 OVER_THE_PATH = 1.3
 """So much more tilt than a moving path asks for itself is allowed while the load goes over to it."""
+STEEPEST = math.radians(35.0)
+"""Likewise, but no more than this, if the path does not ask for more itself."""
 LARGEST_THRUST = 0.85
 """Of each rotor's at full speed: the rest is left to the feedback."""
 LEAST_TENSION = 0.3
@@ -80,6 +82,12 @@ def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Dema
     return Demand(float(tilt.max()), _rotor_share(vehicle, force, float(spacing)), float(pull[:, 2].min()))
 
 
+def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
+    """What a circle (1,) asks for once the load is on it."""
+    rate = max(abs(float(path["angular_rate"][0])), 1e-3)
+    return demand(path, vehicle, 0.0, np.linspace(0.0, 2.0 * math.pi / rate, _SAMPLES))
+
+
 def _rotor_share(vehicle: Vehicle, force: Array, spacing: float) -> float:
     """Largest thrust of a rotor over its own at full speed, for the forces (n, 3), N, every `spacing` s.
 
@@ -115,9 +123,9 @@ def _within(path: Path, vehicle: Vehicle, ramp_time: float) -> bool:
     hover = vehicle.hover_thrust / _available(vehicle)
     thrust = max(LARGEST_THRUST, hover + 0.25 * (1.0 - hover))
     if path["radius"][0] > 0.0:
-        rate = max(abs(float(path["angular_rate"][0])), 1e-3)
-        own = demand(path, vehicle, 0.0, np.linspace(0.0, 2.0 * math.pi / rate, _SAMPLES))
-        tilt, thrust = max(tilt, OVER_THE_PATH * own.tilt), max(thrust, own.thrust)
+        own = demand_of_circle(path, vehicle)
+        steep = max(own.tilt, min(OVER_THE_PATH * own.tilt, STEEPEST))
+        tilt, thrust = max(tilt, steep), max(thrust, own.thrust)
         tension = min(tension, own.tension)
     return ramp.tilt <= tilt and ramp.thrust <= thrust and ramp.tension >= tension
 

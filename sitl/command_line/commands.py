@@ -154,12 +154,14 @@ def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
     from controller.run import ControllerOptions, run
     from sitl.flights.hold import check_design
+    from sitl.flights.refusals import check_feasible
     from sitl.flights.scenario import GroundControl, Hover, usual_feedback
 
     if arguments.over is not None:
         from sitl.command_line.over import run_over
 
         return run_over(arguments, vehicle, scenario)
+    check_feasible(scenario, vehicle, arguments.design)
     speaker = Speaker("controller", events=False)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)

@@ -14,6 +14,7 @@ from typing import Any
 from controller.feedback.truth import estimates
 from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, ProgressLine, watch
+from sitl.flights.refusals import check_feasible
 from sitl.flights.report import OF_THE_PLANT, clear, write_report
 from sitl.flights.scenario import (
     GroundControl,
@@ -125,14 +126,16 @@ class FlightOptions:
                 )
 
     def checked_vehicle(self) -> Vehicle:
-        """The vehicle as the controller is told, once it is sure that the processes take what they are given.
+        """The vehicle as the controller is told, once it is sure that it can fly what it is given.
 
         Raises DescriptionError, before anything is launched.
         """
         only_plant = [Override(text, "--plant-set") for text in self.plant_overrides]
         flown = plant_vehicle(self.scenario, self.vehicle, [*self.overrides, *only_plant])
         checked(self.scenario.faults, flown)
-        return scenario_vehicle(self.scenario, self.vehicle, self.overrides)
+        told = scenario_vehicle(self.scenario, self.vehicle, self.overrides)
+        check_feasible(self.scenario, told, self.design)
+        return told
 
 
 def new_folder(folder: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +16,10 @@ from sitl.command_line import commands as cli
 from sitl.command_line.arguments import build_parser
 from sitl.flights.flight import new_folder
 from sitl.flights.launch import FlightError
+from sitl.flights.refusals import check_feasible
 from sitl.flights.report import PROMISED, table, write_report
+from sitl.flights.scenario import load_scenario
+from sitl_bridge.vehicle.files import load_vehicle
 
 
 def test_flying_alone_is_the_papers_experiment_whatever_options_stand_before() -> None:
@@ -46,6 +50,29 @@ def refused(*arguments: str, cwd: Path | None = None) -> list[str]:
     assert done.returncode == 2, done.stderr
     assert not done.stdout
     return done.stderr.splitlines()
+
+
+@pytest.mark.parametrize("command", ["fly", "controller"])
+def test_what_cannot_be_flown_is_refused_in_a_line(command: str, tmp_path: Path) -> None:
+    file = tmp_path / "fast.toml"
+    file.write_text(
+        'vehicle = "iris"\n[reference]\nkind = "circle"\ncentre = [0, 0, 9]\nradius = 5\nangular_rate = 2\n'
+    )
+    scenario = ["fly", str(file)] if command == "fly" else ["controller", "--scenario", str(file)]
+    (line,) = refused(*scenario)
+    assert line.startswith("iris cannot fly this: reference.angular_rate = 2 rad/s on a radius of 5 m: ")
+    assert (slower := re.search(r"expected angular_rate up to ([0-9.]+) rad/s", line))
+    file.write_text(file.read_text().replace("angular_rate = 2\n", f"angular_rate = {slower[1]}\n"))
+    check_feasible(load_scenario(str(file)), load_vehicle("iris"), "default")
+
+
+def test_a_setpoint_in_the_ground_and_rotors_too_slow_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "low.toml"
+    file.write_text('vehicle = "iris"\n[reference]\nkind = "setpoint"\nposition = [0, 0, -1]\n')
+    (low,) = refused("fly", str(file))
+    assert "reference.position.2 = -1 m" in low
+    (slow,) = refused("fly", "hold", "--vehicle", "iris", "--set", "rotors.0.time_constant=9")
+    assert "time_constant = 9 s" in slow
 
 
 @pytest.mark.parametrize("flag", ["--set", "--plant-set"])

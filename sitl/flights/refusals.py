@@ -1,0 +1,25 @@
+"""What cannot be flown is refused before anything is launched, with the reasons."""
+
+from __future__ import annotations
+
+from sitl.flights.scenario import GroundControl, Scenario
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.files import DescriptionError
+
+FEASIBLE = ("default",)
+"""Designs that follow a feasible motion; the others have the reference as it is set."""
+
+
+def check_feasible(scenario: Scenario | None, vehicle: Vehicle, design: str) -> None:
+    """Raises DescriptionError, a line for each reason, when the vehicle cannot fly at all or cannot fly this.
+
+    Under ground control motions are limited to what it can do.
+    """
+    from controller.design.feasibility import path_faults, vehicle_faults
+
+    faults = vehicle_faults(vehicle)
+    if not faults and scenario is not None and not isinstance(scenario.reference, GroundControl):
+        path = scenario.reference.path(vehicle.initial_load_position)
+        faults = path_faults(path, vehicle, design in FEASIBLE)
+    if faults:
+        raise DescriptionError(f"{vehicle.name} cannot fly this", faults)
