@@ -61,7 +61,8 @@ def test_what_cannot_be_flown_is_refused_in_a_line(command: str, tmp_path: Path)
     scenario = ["fly", str(file)] if command == "fly" else ["controller", "--scenario", str(file)]
     (line,) = refused(*scenario)
     assert line.startswith("iris cannot fly this: reference.angular_rate = 2 rad/s on a radius of 5 m: ")
-    assert (slower := re.search(r"expected angular_rate up to ([0-9.]+) rad/s", line))
+    slower = re.search(r"expected angular_rate up to ([0-9.]+) rad/s", line)
+    assert slower is not None
     file.write_text(file.read_text().replace("angular_rate = 2\n", f"angular_rate = {slower[1]}\n"))
     check_feasible(load_scenario(str(file)), load_vehicle("iris"), "default")
 
