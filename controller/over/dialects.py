@@ -92,6 +92,18 @@ def message_interval(system: int, message_id: int, rate_hz: float) -> mavlink.MA
     )
 
 
+def request_message(system: int, message_id: int) -> mavlink.MAVLink_command_long_message:
+    """REQUEST_MESSAGE: once."""
+    number = mavlink.MAV_CMD_REQUEST_MESSAGE
+    return command(system, number, float(message_id), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def command_name(number: int) -> str:
+    """A MAV_CMD as MAVLink's documentation has it."""
+    names = mavlink.enums["MAV_CMD"]
+    return names[number].name.removeprefix("MAV_CMD_") if number in names else f"command {number}"
+
+
 def command(system: int, number: int, *parameters: float) -> mavlink.MAVLink_command_long_message:
     """COMMAND_LONG to the stack's autopilot."""
     return mavlink.MAVLink_command_long_message(

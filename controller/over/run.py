@@ -1,7 +1,8 @@
-"""The companion's process: the stack's link, the truth's link where there is one, and one loop."""
+"""The companion's process: the stack's link, the plant's truth where there is one, and one loop."""
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,15 +11,23 @@ from typing import Any
 import numpy as np
 
 from controller.feedback.truth import PathFrom
-from controller.law.state import Array
-from controller.over.load_source import load_source
-from controller.over.session import Companion, State
+from controller.law.state import LOAD_POSITION
+from controller.over.companion import Companion
+from controller.over.flight import Flight, State, Step
+from controller.over.load.source import TruthSource, load_source
 from controller.over.stack import Stack
+from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.rowlog import RowLog
 from sitl_bridge.vehicle.description import Vehicle
 
+LONGEST_TURN = 0.02
+"""s between two looks at the links."""
+MOST_DATAGRAMS = 100
+"""Of the stack in a turn, so that a flood does not keep set-points back."""
+REPORT_INTERVAL = 0.2
+"""s between two progress events."""
 LOG_NAME = "companion.parquet"
 LOG_COLUMNS = (
     "time_s",
@@ -43,35 +52,81 @@ class OverOptions:
     load: str = "none"
     """Where the load is known from: truth, position or none."""
     truth: Address | None = None
-    """Link on which the plant's truth comes; with load = truth."""
+    """Link on which the plant's truth comes: to fly on with load = truth, else for the record."""
     out: Path | None = None
+    wait_s: float = math.inf
+    """How long to wait for the stack."""
+
+
+class Report:
+    """Events for a parent: phases with the plant's time, and progress."""
+
+    def __init__(self, flight: Flight, plant: TruthSource | None, speaker: Speaker) -> None:
+        self._flight, self._plant, self._speaker = flight, plant, speaker
+        self._due = 0.0
+        self._state: State | None = None
+
+    def tell(self, now: float) -> None:
+        """Say what is new, or due."""
+        flight = self._flight
+        changed = flight.state is not self._state
+        if changed:
+            self._state = flight.state
+            plant_time = None if self._plant is None else self._plant.time_s
+            self._speaker.event(
+                "phase", phase=flight.state.name.lower(), plant_time_s=plant_time, unix_time_s=time.time()
+            )
+        if now < self._due and not changed:
+            return
+        self._due = now + REPORT_INTERVAL
+        step = flight.last_step
+        self._speaker.event(
+            "progress",
+            doing=flight.state.value,
+            time_s=None if step is None else step.time_s,
+            load_m=None if step is None else step.state[LOAD_POSITION].tolist(),
+            reference_m=None if step is None else step.reference.tolist(),
+        )
+
+
+class Log:
+    """A row for each step of the law."""
+
+    def __init__(self, out: Path) -> None:
+        out.mkdir(parents=True, exist_ok=True)
+        self._log = RowLog(out / LOG_NAME, LOG_COLUMNS)
+        self._last: Step | None = None
+
+    def write(self, step: Step | None) -> None:
+        """Keep a step, once."""
+        if step is not None and step is not self._last:
+            self._last = step
+            self._log.write(np.concatenate(([step.time_s], step.state, step.reference))[None, :])
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._log.close()
 
 
 def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
     """Fly once over a stack; returns what to report of it. Raises OSError when a link cannot be opened."""
     link = open_link(options.over, speaker.say, punctual=True)
     truth = None if options.truth is None else open_link(options.truth, speaker.say)
-    log = None
-    if options.out is not None:
-        options.out.mkdir(parents=True, exist_ok=True)
-        log = RowLog(options.out / LOG_NAME, LOG_COLUMNS)
-
-    def record(time_s: float, state: Array, reference: Array) -> None:
-        if log is not None:
-            log.write(np.concatenate(([time_s], state, reference))[None, :])
-
-    companion = Companion(
-        options.vehicle,
-        options.stack,
-        load_source(options.load, options.vehicle),
-        options.path_from,
-        options.duration_s,
-        speaker.say,
-        record,
+    log = None if options.out is None else Log(options.out)
+    source = load_source(options.load, options.vehicle)
+    plant = source if isinstance(source, TruthSource) else None if truth is None else TruthSource()
+    flight = Flight(
+        options.vehicle, options.stack, source, options.path_from, options.duration_s, speaker.say
     )
+    companion = Companion(flight, options.wait_s)
+    report = Report(flight, plant, speaker)
     speaker.say(f"{options.vehicle.name}: waiting for a flight stack on {options.over}")
     try:
-        _loop(companion, link, truth, stop)
+        while stop.reason is None and not companion.over:
+            _turn(companion, link, truth, plant)
+            if log is not None:
+                log.write(flight.last_step)
+            report.tell(time.monotonic())
     finally:
         link.close()
         if truth is not None:
@@ -79,25 +134,32 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
         if log is not None:
             log.close()
     if stop:
-        speaker.say(f"stopped by {stop.reason}: the stack's own failsafe takes over")
-    return {
-        "completed": companion.state is State.DONE,
-        "failure": companion.failure,
+        speaker.say(f"stopped by {stop.reason}: nothing is sent any more, and the stack's own failsafe holds")
+    outcome = {
+        "completed": flight.state is State.DONE,
+        "failure": flight.failure,
         "stopped_by": stop.reason,
-        "state": companion.state.name.lower(),
-        "control_steps": companion.steps,
+        "state": flight.state.name.lower(),
+        "control_steps": flight.steps,
     }
+    speaker.event("end", **outcome)
+    return outcome
 
 
-def _loop(companion: Companion, link: Link, truth: Link | None, stop: StopRequest) -> None:
-    while stop.reason is None and companion.state not in (State.DONE, State.FAILED):
-        now = time.monotonic()
-        if truth is not None:
-            while (datagram := truth.receive(0.0)) is not None:
-                companion.receive(datagram, time.monotonic())
-        received = link.receive(min(companion.next_deadline(), now + 0.02))
-        now = time.monotonic()
-        if received is not None:
-            companion.receive(received, now)
-        for datagram in companion.to_send(now):
-            link.send(datagram)
+def _turn(companion: Companion, link: Link, truth: Link | None, plant: TruthSource | None) -> None:
+    """What the links bring until something is due, and what is due."""
+    received = [link.receive(min(companion.next_deadline(), time.monotonic() + LONGEST_TURN))]
+    while received[-1] is not None and len(received) < MOST_DATAGRAMS:
+        received.append(link.receive(0.0))
+    now = time.monotonic()
+    if truth is not None:  # first: a set-point is made when the stack's state is taken in
+        while (datagram := truth.receive(0.0)) is not None:
+            companion.receive(datagram, now)
+            if plant is not None and plant is not companion.flight.source:
+                for frame in split(datagram).frames:
+                    plant.hear(frame, now)
+    for datagram in received:
+        if datagram is not None:
+            companion.receive(datagram, now)
+    for datagram in companion.to_send(now):
+        link.send(datagram)

@@ -6,6 +6,7 @@ World ENU about the stack's local origin, body FLU, SI units.
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -26,9 +27,13 @@ from sitl_bridge.frames import (
 )
 from sitl_bridge.mavlink.framing import Frame, decode
 
-SYNC_SHARE = 0.1
-"""Of a new sample in the smoothed offset of the clocks."""
 MOST_TEXTS = 50
+TEXT_LENGTH = 50
+"""Characters of a STATUSTEXT; a longer text comes in several."""
+SAMPLES = 5
+"""TIMESYNC answers that have to agree before an age is told from them."""
+LARGEST_SPREAD = 0.05
+"""s between those: beyond it the stack's clock does not run at the pace of ours."""
 
 
 class VehicleState(NamedTuple):
@@ -64,19 +69,20 @@ class Ack(NamedTuple):
 class ClockOffset:
     """The stack's clock against ours, from TIMESYNC: stack - ours, s."""
 
-    offset: float | None = None
+    _samples: deque[float] = field(default_factory=lambda: deque(maxlen=SAMPLES))
 
     def sample(self, sent_s: float, stack_s: float, now: float) -> None:
         """A TIMESYNC that we sent at `sent_s` came back at `now` with the stack's time."""
-        found = stack_s - 0.5 * (sent_s + now)
-        if self.offset is None or abs(found - self.offset) > 1.0:
-            self.offset = found
-        else:
-            self.offset += SYNC_SHARE * (found - self.offset)
+        self._samples.append(stack_s - 0.5 * (sent_s + now))
 
     def age(self, stack_s: float, now: float) -> float | None:
-        """s since an instant of the stack's clock; None: the clocks have not been compared yet."""
-        return None if self.offset is None else now - (stack_s - self.offset)
+        """s since an instant of the stack's clock.
+
+        None: not known yet, or a simulated clock that does not keep pace with ours.
+        """
+        if len(self._samples) < SAMPLES or max(self._samples) - min(self._samples) > LARGEST_SPREAD:
+            return None
+        return now - (stack_s - statistics.median(self._samples))
 
 
 @dataclass
@@ -100,19 +106,27 @@ class Telemetry:
     """m, of the vehicle."""
     home_altitude: float | None = None
     """m above the sea."""
+    home: Triple | None = None
+    """Where it took off, or will, m in the stack's local frame."""
     clock: ClockOffset = field(default_factory=ClockOffset)
     parameters: dict[str, float] = field(default_factory=dict)
     acks: deque[Ack] = field(default_factory=deque)
     """Not taken yet, oldest first."""
     texts: deque[str] = field(default_factory=lambda: deque(maxlen=MOST_TEXTS))
     """STATUSTEXTs that have not been shown yet."""
+    said: deque[str] = field(default_factory=lambda: deque(maxlen=MOST_TEXTS))
+    """STATUSTEXTs, all of them."""
     imu: deque[ImuSample] = field(default_factory=lambda: deque(maxlen=100))
     """Not taken yet."""
     fresh: bool = False
     """Whether the vehicle's state is newer than the last time somebody cleared this."""
     _attitude: Quaternion | None = None
     _rates: Triple = (0.0, 0.0, 0.0)
+    has_imu: bool = False
+    """Whether there has been a HIGHRES_IMU."""
     _has_odometry: bool = False
+    _text_parts: dict[int, str] = field(default_factory=dict)
+    """Of STATUSTEXTs that come in several frames, by their id."""
 
     def take(self, frame: Frame, now: float) -> None:
         """Take in one frame; what is not the stack's autopilot's is ignored."""
@@ -173,6 +187,7 @@ class Telemetry:
     def _on_imu(self, frame: Frame, message: Any, now: float) -> None:
         force = flu_to_frd((message.xacc, message.yacc, message.zacc))
         if all(map(math.isfinite, force)):
+            self.has_imu = True
             self.imu.append(ImuSample(message.time_usec * 1e-6, force))
 
     def _on_origin(self, frame: Frame, message: Any, now: float) -> None:
@@ -185,6 +200,17 @@ class Telemetry:
     def _on_global_position(self, frame: Frame, message: Any, now: float) -> None:
         self.altitude_msl = message.alt / MILLIMETRES_PER_METRE
         self.home_altitude = self.altitude_msl - message.relative_alt / MILLIMETRES_PER_METRE
+
+    def state_age(self, now: float) -> float:
+        """Age of the vehicle's state, s: since it came, and by the clocks where they keep pace."""
+        if self.vehicle is None:
+            return math.inf
+        return max(now - self.vehicle_at, self.clock.age(self.vehicle.time_s, now) or 0.0)
+
+    def _on_home(self, frame: Frame, message: Any, now: float) -> None:
+        place = (message.x, message.y, message.z)
+        if all(map(math.isfinite, place)):
+            self.home = enu_to_ned(place)
 
     def local(self, point: Geodetic) -> Triple | None:
         """A place on Earth in the stack's local frame; None while its origin is not known."""
@@ -200,7 +226,13 @@ class Telemetry:
         self.parameters[message.param_id.rstrip("\0")] = message.param_value
 
     def _on_text(self, frame: Frame, message: Any, now: float) -> None:
-        self.texts.append(message.text.rstrip("\0"))
+        part = message.text.rstrip("\0")
+        text = self._text_parts.pop(message.id, "") + part if message.chunk_seq else part
+        if message.id and len(part) == TEXT_LENGTH:  # there is more to come
+            self._text_parts = {message.id: text}
+            return
+        self.texts.append(text)
+        self.said.append(text)
 
     def _on_timesync(self, frame: Frame, message: Any, now: float) -> None:
         if message.tc1 > 0:
@@ -215,6 +247,7 @@ _HANDLERS = {
     mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: Telemetry._on_imu,
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: Telemetry._on_origin,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Telemetry._on_global_position,
+    mavlink.MAVLINK_MSG_ID_HOME_POSITION: Telemetry._on_home,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: Telemetry._on_landed,
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: Telemetry._on_ack,
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: Telemetry._on_parameter,

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 from controller.ground.link.ports import STATION_LOCAL, STATION_PEER
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT
 
+STACK_UDP_PORT, STACK_TCP_PORT = 14540, 5760
+"""Where PX4 sends for a companion computer, and where ArduPilot's SITL listens."""
+
 if TYPE_CHECKING:
     from controller.pilot.ground_link import Ports
 
@@ -46,6 +49,19 @@ def link_address(text: str) -> str:
 
     try:
         address = parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    if address.port == 0:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a port that the other end can know, 1 to 65535")
+    return text
+
+
+def stack_address(text: str) -> str:
+    """An argument type: the address of a flight stack, a serial line's too."""
+    from sitl_bridge.mavlink.links import parse_stack_address
+
+    try:
+        address = parse_stack_address(text, STACK_UDP_PORT, STACK_TCP_PORT)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
     if address.port == 0:

@@ -8,7 +8,14 @@ from typing import Any, NoReturn
 
 from controller.design.names import DESIGNS
 from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
-from sitl.command_line.argument_types import host_and_port, link_address, number, ports, whole
+from sitl.command_line.argument_types import (
+    host_and_port,
+    link_address,
+    number,
+    ports,
+    stack_address,
+    whole,
+)
 from sitl.command_line.export import add_export
 from sitl.command_line.sweep import add_sweep
 from sitl.command_line.view import add_view
@@ -67,6 +74,7 @@ def build_parser() -> argparse.ArgumentParser:
         action="store_true",
         help="join plant and controller in one process, without sockets: the same state log, faster",
     )
+    _over(fly)
     fly.add_argument(
         "--plant-set",
         metavar="KEY=VALUE",
@@ -87,8 +95,10 @@ def build_parser() -> argparse.ArgumentParser:
         "--truth-to",
         metavar="HOST:PORT",
         type=host_and_port,
-        help="show the true state of vehicle and load to a viewer: HIL_STATE_QUATERNION and ODOMETRY "
-        "(PX4's viewers listen on 127.0.0.1:19410)",
+        action="append",
+        default=[],
+        help="show the true state of vehicle and load to a viewer or companion: HIL_STATE_QUATERNION and "
+        "ODOMETRY (PX4's viewers listen on 127.0.0.1:19410; repeatable)",
     )
     plant.add_argument(
         "--load-to",
@@ -243,8 +253,9 @@ def _over(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--over",
         metavar="ADDRESS",
-        type=link_address,
-        help="the stack's MAVLink, as udpin:127.0.0.1:14540; instead of the HIL link",
+        type=stack_address,
+        help="the stack's MAVLink, as udpin:127.0.0.1:14540 or serial:/dev/ttyACM0:921600; for `controller` "
+        "instead of the HIL link",
     )
     group.add_argument(
         "--load",
@@ -257,9 +268,17 @@ def _over(parser: argparse.ArgumentParser) -> None:
         "--truth-from",
         metavar="ADDRESS",
         type=link_address,
-        help="with --load truth: where the plant's --truth-to sends (default: udpin:127.0.0.1:19410)",
+        help="where the plant's --truth-to sends, for --load truth (default: udpin:127.0.0.1:19410; `fly` "
+        "arranges it)",
     )
     group.add_argument("--stack", metavar="FILE", type=Path, help="lags, delay and thrust of the stack, TOML")
+    group.add_argument(
+        "--wait",
+        metavar="S",
+        type=number(1, 1e6, "seconds"),
+        default=60.0,
+        help="how long to wait for the stack, and then for its state (default: %(default)g)",
+    )
 
 
 def _control(parser: argparse.ArgumentParser) -> None:

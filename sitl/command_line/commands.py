@@ -144,7 +144,8 @@ def _plant(arguments: argparse.Namespace) -> int:
         truth_to=arguments.truth_to,
     )
     with _audience(arguments, vehicle) as viewer:
-        outcome = run(replace(options, truth_to=viewer or options.truth_to), speaker, stop)
+        seers = options.truth_to if viewer is None else [*options.truth_to, viewer]
+        outcome = run(replace(options, truth_to=seers), speaker, stop)
     if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
     return FAILED if outcome["failure"] else 0
@@ -196,6 +197,12 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flights.scenario import GroundControl, load_scenario
     from sitl_bridge.mavlink.links import Address
 
+    if arguments.over is not None:
+        from sitl.command_line.over import fly_over_stack
+
+        hil = _hil_address(arguments, "tcpin")
+        kept = _timing(arguments, AS_PX4_EXPECTS if hil.kind == "tcpin" else Timing("realtime", None))
+        return fly_over_stack(arguments, hil, kept, _overrides(arguments), _audience)
     timing = _timing(arguments, Timing("lockstep" if arguments.in_process else "realtime", None))
     scenario = load_scenario(arguments.scenario)
     options = FlightOptions(

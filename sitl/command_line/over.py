@@ -1,29 +1,40 @@
-"""`sitl controller --over`: the law as a companion of a flight stack."""
+"""`--over`: the law as a companion of a flight stack, alone (`controller`) or with the plant (`fly`)."""
 
 from __future__ import annotations
 
 import argparse
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-from sitl.exit_codes import FAILED
-from sitl_bridge.mavlink.links import parse_address
+from sitl.command_line.argument_types import STACK_TCP_PORT, STACK_UDP_PORT
+from sitl.exit_codes import FAILED, INTERRUPTED
+from sitl_bridge.mavlink.links import parse_address, parse_stack_address
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
+    from sitl.command_line.commands import Timing
     from sitl.flights.scenario import Scenario
+    from sitl_bridge.mavlink.links import Address
 
 TRUTH_PORT = 19410
 DEFAULT_DURATION = 60.0
 """s, of a reference that has none."""
 
 
+def _stack_address(arguments: argparse.Namespace) -> Address:
+    return parse_stack_address(arguments.over, STACK_UDP_PORT + arguments.instance, STACK_TCP_PORT)
+
+
 def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario | None) -> int:
     """Fly one reference over a stack; exit code 1 when it did not come to its end."""
     from controller.over.run import OverOptions, run
     from controller.over.stack import Stack, read_stack
+    from sitl.flights.refusals import check_feasible
     from sitl.flights.scenario import GroundControl, Hover
 
     reference = scenario.reference if scenario else Hover(kind="hover")
@@ -31,27 +42,97 @@ def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario
         raise DescriptionError(
             "--over", ["flies a reference; expected a scenario with one, such as setpoint"]
         )
-    if arguments.truth_from is not None and arguments.load != "truth":
-        raise DescriptionError("--truth-from", ["goes with --load truth"])
+    if scenario is not None:
+        check_feasible(scenario, vehicle, "default")
     truth = None
-    if arguments.load == "truth":
+    if arguments.load == "truth" or arguments.truth_from is not None:
         truth = parse_address(arguments.truth_from or "udpin", TRUTH_PORT, TRUTH_PORT)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
     outcome = run(
         OverOptions(
             vehicle=vehicle,
-            over=parse_address(arguments.over, 14540, 5760),
+            over=_stack_address(arguments),
             path_from=reference.path,
             duration_s=arguments.duration or (scenario.duration if scenario else None) or DEFAULT_DURATION,
             stack=Stack() if arguments.stack is None else read_stack(arguments.stack),
             load=arguments.load,
             truth=truth,
             out=arguments.out,
+            wait_s=arguments.wait,
         ),
-        Speaker("controller", events=False),
+        Speaker("controller", events=arguments.until_eof),
         stop,
     )
-    if arguments.json:
+    if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
     return 0 if outcome["completed"] else FAILED
+
+
+NOT_OVER_A_STACK = {
+    "in_process": "the stack is a process of its own",
+    "design": "the companion has a design of its own",
+    "feedback": "--load says where the load is known from",
+    "gcs": "the stack has the link to ground control",
+    "onboard": "--over is the link to the stack",
+    "signing_key": "the link to the stack is not signed",
+    "parameters": "the stack has the parameters",
+    "expose": "the stack has the link to ground control",
+}
+"""Flags of `fly` that mean nothing here, and why."""
+USUAL: dict[str, Any] = {"in_process": False, "design": "default", "expose": False}
+
+
+def fly_over_stack(
+    arguments: argparse.Namespace,
+    hil: Address,
+    timing: Timing,
+    overrides: Sequence[str],
+    audience: Callable[[argparse.Namespace, Vehicle], AbstractContextManager[tuple[str, int] | None]],
+) -> int:
+    """`sitl fly --over`: launch plant and companion, and report; exit code 1 when the load did not settle."""
+    from sitl.flights.report import table, written
+    from sitl.flights.scenario import load_scenario
+    from sitl.over.flight import OverFlight, fly_over
+    from sitl.over.flight import table as table_of_step
+
+    for name, why in NOT_OVER_A_STACK.items():
+        if getattr(arguments, name) != USUAL.get(name):
+            raise DescriptionError(f"--{name.replace('_', '-')}", [f"does not go with --over: {why}"])
+    scenario = load_scenario(arguments.scenario)
+    options = OverFlight(
+        scenario_name=arguments.scenario,
+        scenario=scenario,
+        vehicle=arguments.vehicle,
+        overrides=overrides,
+        plant_overrides=arguments.plant_set,
+        hil=hil,
+        over=str(_stack_address(arguments)),
+        load=arguments.load,
+        stack=arguments.stack,
+        clock=timing.clock,
+        speed=timing.speed,
+        on_silence=timing.on_silence,
+        rate_hz=arguments.rate,
+        seed=arguments.seed,
+        duration_s=arguments.duration or scenario.duration or DEFAULT_DURATION,
+        wait_s=arguments.wait,
+        instance=arguments.instance,
+        out=arguments.out,
+    )
+    if arguments.truth_from is not None:
+        raise DescriptionError("--truth-from", ["`fly` arranges it; expected with `controller` only"])
+    stop = StopRequest()
+    stop.install()
+    with audience(arguments, options.told()) as viewer:
+        summary, out = fly_over(replace(options, truth_to=viewer), stop)
+    if arguments.json:
+        print(json.dumps(summary, indent=2))
+    else:
+        print(table(summary))
+        print(table_of_step(summary))
+        for file in written(out):
+            print(f"  {file}")
+    if stop:
+        return INTERRUPTED
+    return 0 if summary["settled"] else FAILED

@@ -17,7 +17,7 @@ from sitl_bridge.mavlink.hil import HIL_SENSOR
 
 RECEIVE_BUFFER = 1 << 20
 KINDS = ("udpout", "udpin", "tcpin", "tcpout")
-Kind = Literal["udpout", "udpin", "tcpin", "tcpout"]
+Kind = Literal["udpout", "udpin", "tcpin", "tcpout", "serial"]
 
 COARSE_WAIT = 0.005
 """Grain of the socket's own time-out, s: too coarse for a tick's deadline, one system call less otherwise."""
@@ -32,7 +32,9 @@ class Address(NamedTuple):
 
     kind: Kind
     host: str
+    """Of a serial line: its device."""
     port: int
+    """Of a serial line: its baud rate."""
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.host}:{self.port}"
@@ -59,6 +61,26 @@ def parse_address(text: str, udp_port: int | None = None, tcp_port: int | None =
     if kind not in KINDS or not possible_host(host) or not port.isdecimal() or not 0 <= int(port) <= 65535:
         raise ValueError(f"{text!r}: expected {'|'.join(KINDS)}:HOST:PORT, as in udpout:127.0.0.1:14560")
     return Address(kind, host, int(port))  # type: ignore[arg-type]  # just checked against KINDS
+
+
+USUAL_BAUD = 921_600
+"""PX4's for a companion computer."""
+
+
+def parse_stack_address(text: str, udp_port: int, tcp_port: int) -> Address:
+    """`parse_address`, and `serial:DEVICE[:BAUD]` besides; raises ValueError."""
+    kind, _, rest = text.partition(":")
+    if kind != "serial":
+        try:
+            return parse_address(text, udp_port, tcp_port)
+        except ValueError as error:
+            raise ValueError(f"{error}, or serial:DEVICE:BAUD") from None
+    device, colon, baud = rest.rpartition(":")
+    if not colon:
+        device, baud = rest, str(USUAL_BAUD)
+    if not device or not baud.isdecimal() or not int(baud):
+        raise ValueError(f"{text!r}: expected serial:DEVICE:BAUD, as in serial:/dev/ttyACM0:{USUAL_BAUD}")
+    return Address("serial", device, int(baud))
 
 
 class Link(Protocol):
@@ -406,7 +428,11 @@ class TcpLink:
 
 
 def open_link(address: Address, say: Callable[[str], None], punctual: bool = False) -> Link:
-    """Open the link of an address. Raises OSError when the port is taken or the host unknown."""
+    """Open the link of an address. Raises OSError when a port or device is taken, a host unknown."""
     if address.kind in ("udpin", "udpout"):
         return UdpLink(address, punctual)
+    if address.kind == "serial":
+        from sitl_bridge.mavlink.serial_link import SerialLink
+
+        return SerialLink(address.host, address.port, say)
     return TcpLink(address, say)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -52,8 +53,8 @@ class PlantOptions:
     """Ground station that is shown the load directly."""
     end_when_lost: bool = False
     """End the scenario a few seconds after the vehicle is lost."""
-    truth_to: tuple[str, int] | None = None
-    """Viewer that is shown the true state of vehicle and load."""
+    truth_to: Sequence[tuple[str, int]] = ()
+    """Viewers and companions that are shown the true state of vehicle and load."""
 
 
 class Progress:
@@ -65,11 +66,11 @@ class Progress:
         """When there is something to report, of `time.monotonic()`."""
         self.began_at: float | None = None
 
-    def begin(self) -> None:
-        """The first armed answer is in."""
+    def begin(self, time_usec: int) -> None:
+        """The first armed answer is in; time_usec: of the tick with which the scenario begins."""
         self.began_at = time.monotonic()
         self._speaker.say("the autopilot is armed: the scenario begins")
-        self._speaker.event("begin", unix_time_s=time.time())
+        self._speaker.event("begin", unix_time_s=time.time(), time_usec=time_usec)
 
     def report(self, now: float, simulation: Simulation) -> None:
         """Say how far the scenario is, from time to time."""
@@ -100,7 +101,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         options.seed,
         options.instance,
         options.duration_s,
-        on_begin=progress.begin,
+        on_begin=lambda: progress.begin(simulation.time_usec),
         faults=options.faults,
         end_when_lost=options.end_when_lost,
     )
@@ -133,8 +134,8 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
     try:
         if options.load_to is not None:
             audience.append(Listener(options.load_to, LoadTo(options.instance, simulation.origin)))
-        if options.truth_to is not None:
-            audience.append(Listener(options.truth_to, TruthTo(options.instance, simulation.origin)))
+        for address in options.truth_to:
+            audience.append(Listener(address, TruthTo(options.instance, simulation.origin)))
         _loop(clock, link, tlog, progress, audience, stop)
     except Diverged as error:
         failure = str(error)

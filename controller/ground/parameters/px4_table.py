@@ -147,7 +147,7 @@ _ROWS: tuple[tuple[str, float, float, float, str, str], ...] = (
     ("MC_YAWRATE_P", 0.2, 0.0, 0.6, "", "Gain of the yaw rate"),
     ("MC_YAWRATE_I", 0.1, 0.0, 10.0, "", "Integral gain of the yaw rate"),
     ("MC_AIRMODE", 0, 0, 2, "", "Attitude has priority over thrust"),
-    ("THR_MDL_FAC", 0.0, 0.0, 1.0, "", "Share of the square in the thrust curve"),
+    ("THR_MDL_FAC", 1.0, 0.0, 1.0, "", "Share of the square in the thrust curve; this autopilot's thrust is linear in force: 1"),
     ("LNDMC_Z_VEL_MAX", 0.25, 0.0, 4.0, "m/s", "Vertical speed below which the vehicle may be landed"),
     ("LNDMC_ALT_MAX", -1.0, -1.0, 10000.0, "m", "Largest height; -1: none"),
     # Simulator, system, sensors, estimator, logs

@@ -21,7 +21,7 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
-from controller.over.pendulum_filter import PendulumFilter
+from controller.over.load.pendulum_filter import PendulumFilter
 from controller.over.telemetry import Telemetry, VehicleState
 from sitl_bridge.frames import (
     CENTIMETRES_PER_METRE,
@@ -42,16 +42,24 @@ LOAD_GPS_DEVIATION = 0.5
 """m, of the load's own position messages."""
 MOST_TRUTH_AGE = 0.2
 """s"""
+MOST_POSITION_AGE = 2.0
+"""s"""
 
 
 class LoadSource(Protocol):
     """Knows the load beside the stack's vehicle."""
+
+    in_world: bool
+    """Whether the state is in the scenario's frame; else it is in the stack's local one."""
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything that a link brings, the truth's link included."""
 
     def state(self, telemetry: Telemetry, now: float) -> Array | None:
         """The law's state (18,) at the stack's newest state; None while there is none to fly on."""
+
+    def missing(self, telemetry: Telemetry, now: float) -> str | None:
+        """What has to come before there is a state, in words; None: nothing."""
 
 
 def law_state(vehicle: VehicleState) -> Array:
@@ -65,6 +73,8 @@ def law_state(vehicle: VehicleState) -> Array:
 
 class TruthSource:
     """The plant's ODOMETRY of vehicle and load (`sitl plant --truth-to`)."""
+
+    in_world = True
 
     def __init__(self) -> None:
         self._vehicle: VehicleState | None = None
@@ -86,6 +96,19 @@ class TruthSource:
             self._vehicle = VehicleState(message.time_usec * 1e-6, place, velocity, attitude, rates)
             self._at = now
 
+    @property
+    def time_s(self) -> float | None:
+        """The plant's time of the newest state, s; None: there is none."""
+        return None if self._vehicle is None else self._vehicle.time_s
+
+    def missing(self, telemetry: Telemetry, now: float) -> str | None:
+        """ODOMETRY of both bodies."""
+        if self._vehicle is None or self._load is None:
+            return "the plant's ODOMETRY of vehicle and load (`sitl plant --truth-to`)"
+        if now - self._at > MOST_TRUTH_AGE:
+            return "new ODOMETRY from the plant"
+        return None
+
     def state(self, telemetry: Telemetry, now: float) -> Array | None:
         """Vehicle and load as the plant has them."""
         if self._vehicle is None or self._load is None or now - self._at > MOST_TRUTH_AGE:
@@ -98,18 +121,33 @@ class TruthSource:
 class FilteredSource:
     """The pendulum filter on the stack's state and HIGHRES_IMU, with the load's own position if asked for."""
 
+    in_world = False
+
     def __init__(self, vehicle: Vehicle, uses_position: bool) -> None:
         self._vehicle = vehicle
         self._uses_position = uses_position
         self._filter: PendulumFilter | None = None
         self._time: float | None = None
         self._heard: list[Any] = []
+        self._heard_at = -math.inf
+
+    def missing(self, telemetry: Telemetry, now: float) -> str | None:
+        """HIGHRES_IMU; with the load's position that one, and where the stack's local frame is."""
+        wanted = []
+        if not telemetry.has_imu:
+            wanted.append("the stack's HIGHRES_IMU")
+        if self._uses_position and telemetry.origin is None:
+            wanted.append("the stack's GPS_GLOBAL_ORIGIN")
+        if self._uses_position and now - self._heard_at > MOST_POSITION_AGE:
+            wanted.append("GLOBAL_POSITION_INT of the load (component 35)")
+        return ", ".join(wanted) or None
 
     def hear(self, frame: Frame, now: float) -> None:
         """GLOBAL_POSITION_INT of the load, where it is to be used."""
         position = frame.message_id == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
         if self._uses_position and position and frame.component == COMPONENT_LOAD:
             self._heard.append(decode(frame))
+            self._heard_at = now
 
     def state(self, telemetry: Telemetry, now: float) -> Array | None:
         """The vehicle as the stack has it, the load as the filter has it."""

@@ -1,0 +1,240 @@
+"""What the phases of a flight over a stack share: what is known, what is sent, and which phase it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+from pymavlink.dialects.v20 import common as mavlink
+
+from controller.feedback.truth import PathFrom
+from controller.law.reference import Path
+from controller.law.state import Array
+from controller.over import dialects
+from controller.over.dialects import DIALECTS, ModeNumbers
+from controller.over.law import CompanionLaw, Setpoint, design
+from controller.over.load.source import LoadSource
+from controller.over.stack import Stack, full_thrust, thrust_setpoint
+from controller.over.telemetry import Telemetry
+from sitl_bridge.frames import Triple, flu_to_frd
+from sitl_bridge.mavlink.framing import Packer
+from sitl_bridge.vehicle.description import Vehicle
+
+OUR_SYSTEM = 200
+RETRY_INTERVAL = 1.0
+"""s between two commands of a kind."""
+RATES_ONLY = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+LAST_TEXTS = 3
+"""STATUSTEXTs of the stack that a failure repeats."""
+
+
+class State(Enum):
+    """Where a flight is, in words."""
+
+    CONNECTING = "waiting for the stack"
+    PREPARING = "waiting for the vehicle's and the load's state"
+    ARMING = "arming"
+    TAKING_OFF = "taking off"
+    STREAMING = "streaming set-points"
+    TAKING_OVER = "taking over"
+    STEADYING = "taking the swing out"
+    FLYING = "flying the load"
+    HANDING_BACK = "handing back"
+    LANDING = "landing"
+    DONE = "landed"
+    FAILED = "failed"
+
+
+class Step(NamedTuple):
+    """One step of the law."""
+
+    time_s: float
+    """Since the reference began, by the stack's clock."""
+    state: Array
+    """(18,), eq. 31."""
+    reference: Array
+    """(3,), m: where the load is to be."""
+
+
+class Flight:
+    """One flight over a stack. The phases change it; `Companion` carries its bytes."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        stack: Stack,
+        source: LoadSource,
+        path_from: PathFrom,
+        duration_s: float,
+        say: Callable[[str], None],
+    ) -> None:
+        """path_from: the reference for a load at a place, world; duration_s: of the reference."""
+        self.vehicle, self.stack, self.source = vehicle, stack, source
+        self.path_from, self.duration_s, self.say = path_from, duration_s, say
+        self.dialect = DIALECTS[stack.kind]
+        self.design = design(vehicle, stack)
+        self.telemetry = Telemetry()
+        self.path: Path | None = None
+        """The reference in the frame of the state, once it is planned."""
+        self.law: CompanionLaw | None = None
+        self.state = State.CONNECTING
+        self.since = 0.0
+        """When this phase began, s of `now`."""
+        self.missing = ""
+        """What this phase waits for, in words."""
+        self.failure: str | None = None
+        self.steps = 0
+        self.last_step: Step | None = None
+        self.begin_time: float | None = None
+        """When the law's path began, s by the stack's clock."""
+        self.still_since: float | None = None
+        """Since when the vehicle has been at its height, or the load at rest, s of `now`."""
+        self.estimated_at = 0.0
+        """When the last state was made, s of `now`."""
+        self.next_try = 0.0
+        self.out: list[bytes] = []
+        self._full = full_thrust(vehicle, stack)
+        self._packer = Packer(OUR_SYSTEM, mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
+
+    # What is known.
+
+    @property
+    def system(self) -> int:
+        """The stack's system; there has been a HEARTBEAT."""
+        assert self.telemetry.system is not None
+        return self.telemetry.system
+
+    @property
+    def stack_time(self) -> float:
+        """s, of the newest state by the stack's clock; there is one."""
+        assert self.telemetry.vehicle is not None
+        return self.telemetry.vehicle.time_s
+
+    def in_mode(self, numbers: ModeNumbers) -> bool:
+        """Whether the stack says that it is in a mode."""
+        return self.telemetry.custom_mode == numbers.custom
+
+    def new_estimate(self, now: float) -> Array | None:
+        """The law's state (18,), once for each new state of the stack; None: there is none to fly on."""
+        if not self.telemetry.fresh:
+            return None
+        self.telemetry.fresh = False
+        estimate = self.source.state(self.telemetry, now)
+        if estimate is not None:
+            self.estimated_at = now
+        return estimate
+
+    def world_origin(self) -> Triple:
+        """Where the scenario's origin is in the frame of the state, m ENU.
+
+        A scenario counts from where its vehicle stands at the start. The stack's home is there.
+        """
+        if self.source.in_world:
+            return (0.0, 0.0, 0.0)
+        home = self.telemetry.home
+        if home is None:
+            return (0.0, 0.0, 0.0)
+        east, north, up = standing_place(self.vehicle)
+        return (home[0] - east, home[1] - north, home[2] - up)
+
+    # What is sent.
+
+    def pack(self, message: Any) -> None:
+        """Send a message."""
+        self.out.append(self._packer.pack(message))
+
+    def ask_for_mode(self, numbers: ModeNumbers) -> None:
+        """DO_SET_MODE."""
+        self.pack(dialects.set_mode(self.system, numbers))
+
+    def due(self, now: float) -> bool:
+        """Whether a command may be sent again."""
+        if now < self.next_try:
+            return False
+        self.next_try = now + RETRY_INTERVAL
+        return True
+
+    def hover_setpoint(self) -> Setpoint:
+        """What is streamed before the take-over: without effect then, and harmless."""
+        return Setpoint(self.vehicle.hover_thrust, (0.0, 0.0, 0.0))
+
+    def send(self, wanted: Setpoint) -> None:
+        """SET_ATTITUDE_TARGET with body rates and thrust."""
+        curve = self.stack.thrust_curve
+        if curve is None:
+            curve = self.telemetry.parameters.get(self.dialect.thrust_parameter or "", 0.0)
+        milliseconds = round(self.stack_time * 1e3) & 0xFFFFFFFF
+        self.pack(
+            mavlink.MAVLink_set_attitude_target_message(
+                milliseconds,
+                self.system,
+                1,
+                RATES_ONLY,
+                [1.0, 0.0, 0.0, 0.0],
+                *flu_to_frd(wanted.rates),
+                thrust_setpoint(wanted.thrust, self._full, curve),
+            )
+        )
+
+    def fly(self, estimate: Array) -> None:
+        """One step of the law."""
+        assert self.law is not None
+        assert self.begin_time is not None
+        time_s = self.stack_time - self.begin_time
+        self.send(self.law.step(estimate, time_s))
+        self.steps += 1
+        if self.state is State.FLYING:
+            self.last_step = Step(time_s, estimate, self.law.reference)
+
+    # How it goes on.
+
+    def note_acks(self, what: str) -> None:
+        """Say which commands were refused."""
+        while self.telemetry.acks:
+            command, result = self.telemetry.acks.popleft()
+            if result in (mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_IN_PROGRESS):
+                continue
+            if command in (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE):
+                continue  # not every stack has every message
+            self.say(f"{what}: the stack answers {dialects.command_name(command)} with {result_name(result)}")
+
+    def go(self, state: State, now: float) -> None:
+        """On to another phase."""
+        self.state, self.since, self.next_try, self.missing = state, now, now, ""
+
+    def fail(self, why: str, now: float) -> None:
+        """It is over, and nothing is sent any more."""
+        self.failure = why
+        self.say(why)
+        self.go(State.FAILED, now)
+
+    def give_up(self, waited: float, now: float) -> None:
+        """What was waited for did not come: with the stack's last words, which may say why."""
+        words = f"waited {waited:g} s for {self.missing or self.state.value}"
+        said = list(self.telemetry.said)[-LAST_TEXTS:]
+        if said:
+            words += "; the stack's last words: " + " | ".join(said)
+        self.fail(words, now)
+
+
+def result_name(result: int) -> str:
+    """A MAV_RESULT in words."""
+    names = mavlink.enums["MAV_RESULT"]
+    name = names[result].name.removeprefix("MAV_RESULT_") if result in names else str(result)
+    return name.lower().replace("_", " ")
+
+
+def standing_place(vehicle: Vehicle) -> Triple:
+    """Where a description's vehicle stands before the flight, m, world: its centre above its legs."""
+    ground = 0.0 if vehicle.ground is None else vehicle.ground.height - vehicle.ground.sink
+    legs = -min((leg[2] for leg in vehicle.airframe.legs), default=0.0)
+    return (0.0, 0.0, ground + legs)
+
+
+def moved(path: Path, offset: Triple) -> Path:
+    """A reference path with its centre moved by an offset, m."""
+    path = path.copy()
+    path["centre"] = path["centre"] + np.array(offset)
+    return path
