@@ -44,6 +44,8 @@ class Companion:
         for frame in split(datagram).frames:
             self.flight.telemetry.take(frame, now)
             self.flight.source.hear(frame, now)
+        if self.flight.telemetry.vehicle_at == now:
+            self.flight.ages.mark("state", now)
 
     def to_send(self, now: float) -> list[bytes]:
         """What is due: HEARTBEAT, commands, and a set-point for each new state of the stack."""

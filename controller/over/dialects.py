@@ -44,6 +44,8 @@ class Dialect(NamedTuple):
     """Whether NAV_TAKEOFF's altitude is above home, not above the sea."""
     thrust_parameter: str | None
     """Parameter with the curve from set-point to force."""
+    patience_parameter: str | None
+    """Parameter that says for how many seconds the last set-point is flown when no more come."""
 
 
 PX4 = Dialect(
@@ -54,6 +56,7 @@ PX4 = Dialect(
     takeoff_mode=None,
     relative_takeoff=False,
     thrust_parameter="THR_MDL_FAC",
+    patience_parameter="COM_OF_LOSS_T",
 )
 ARDUCOPTER = Dialect(
     name="ArduCopter",
@@ -63,6 +66,7 @@ ARDUCOPTER = Dialect(
     takeoff_mode=_arducopter(4),
     relative_takeoff=True,
     thrust_parameter="MOT_THST_EXPO",
+    patience_parameter="GUID_TIMEOUT",
 )
 DIALECTS = {"px4": PX4, "ardupilot": ARDUCOPTER}
 

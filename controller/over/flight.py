@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import Enum
 from typing import Any, NamedTuple
@@ -13,12 +14,15 @@ from controller.feedback.truth import PathFrom
 from controller.law.reference import Path
 from controller.law.state import Array
 from controller.over import dialects
+from controller.over.ages import Ages
+from controller.over.baseline import Baseline, message, target
 from controller.over.dialects import DIALECTS, ModeNumbers
+from controller.over.identify.probe import Probe
 from controller.over.law import CompanionLaw, Setpoint, design
 from controller.over.load.source import LoadSource
 from controller.over.stack import Stack, full_thrust, thrust_setpoint
 from controller.over.telemetry import Telemetry
-from sitl_bridge.frames import Triple, flu_to_frd
+from sitl_bridge.frames import Geodetic, Triple, flu_to_frd
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -26,6 +30,8 @@ OUR_SYSTEM = 200
 RETRY_INTERVAL = 1.0
 """s between two commands of a kind."""
 RATES_ONLY = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
+NEAR = 1000.0
+"""m from the description's origin to the stack's."""
 LAST_TEXTS = 3
 """STATUSTEXTs of the stack that a failure repeats."""
 
@@ -69,15 +75,23 @@ class Flight:
         path_from: PathFrom,
         duration_s: float,
         say: Callable[[str], None],
+        probe: Probe | None = None,
+        baseline: Baseline | None = None,
+        ages: Ages | None = None,
     ) -> None:
-        """path_from: the reference for a load at a place, world; duration_s: of the reference."""
+        """path_from: the reference for a load at a place, world; duration_s: of the reference.
+
+        probe: measures how the stack follows, while the reference is flown; baseline: the stack's own
+        position control flies, and the law does not; ages: with a simulated world's time, where it is known.
+        """
         self.vehicle, self.stack, self.source = vehicle, stack, source
         self.path_from, self.duration_s, self.say = path_from, duration_s, say
+        self.probe, self.baseline = probe, baseline
         self.dialect = DIALECTS[stack.kind]
-        self.design = design(vehicle, stack)
+        self.design = design(vehicle, stack, accurate=source.in_world)
         self.telemetry = Telemetry()
-        self.path: Path | None = None
-        """The reference in the frame of the state, once it is planned."""
+        self.ramp_time: float | None = None
+        """s, in which the reference leaves its start, once it is planned."""
         self.law: CompanionLaw | None = None
         self.state = State.CONNECTING
         self.since = 0.0
@@ -91,8 +105,8 @@ class Flight:
         """When the law's path began, s by the stack's clock."""
         self.still_since: float | None = None
         """Since when the vehicle has been at its height, or the load at rest, s of `now`."""
-        self.estimated_at = 0.0
-        """When the last state was made, s of `now`."""
+        self.ages = Ages() if ages is None else ages
+        """Of `state`, the stack's, and `estimate`, what the law flies on."""
         self.next_try = 0.0
         self.out: list[bytes] = []
         self._full = full_thrust(vehicle, stack)
@@ -123,21 +137,41 @@ class Flight:
         self.telemetry.fresh = False
         estimate = self.source.state(self.telemetry, now)
         if estimate is not None:
-            self.estimated_at = now
+            self.ages.mark("estimate", now)
         return estimate
+
+    def state_age(self, now: float) -> float:
+        """s since the vehicle was as the stack's newest state says, by TIMESYNC where clocks keep pace."""
+        t = self.telemetry
+        age = self.ages.age("state", now)
+        synchronised = None if t.vehicle is None else t.clock.age(t.vehicle.time_s, now)
+        return age if synchronised is None or self.ages.simulated else max(age, synchronised)
 
     def world_origin(self) -> Triple:
         """Where the scenario's origin is in the frame of the state, m ENU.
 
-        A scenario counts from where its vehicle stands at the start. The stack's home is there.
+        It is where the description has it, if the stack is near; else where the vehicle stood at the start,
+        the stack's home. A home is as wrong as the position was at arming.
         """
+        t = self.telemetry
         if self.source.in_world:
             return (0.0, 0.0, 0.0)
-        home = self.telemetry.home
-        if home is None:
+        home = self.vehicle.home
+        described = t.local(Geodetic(home.latitude, home.longitude, home.altitude))
+        if described is not None and math.hypot(*described) < NEAR:
+            return described
+        if t.home is None:
             return (0.0, 0.0, 0.0)
         east, north, up = standing_place(self.vehicle)
-        return (home[0] - east, home[1] - north, home[2] - up)
+        return (t.home[0] - east, t.home[1] - north, t.home[2] - up)
+
+    def reference(self, load: Array) -> Path:
+        """The reference for a load at a place (3,), m, in the frame of the state."""
+        east, north, up = origin = self.world_origin()
+        x, y, z = load.tolist()
+        path = moved(self.path_from((x - east, y - north, z - up)), origin)
+        path["start"] = load
+        return path
 
     # What is sent.
 
@@ -160,11 +194,12 @@ class Flight:
         """What is streamed before the take-over: without effect then, and harmless."""
         return Setpoint(self.vehicle.hover_thrust, (0.0, 0.0, 0.0))
 
-    def send(self, wanted: Setpoint) -> None:
-        """SET_ATTITUDE_TARGET with body rates and thrust."""
+    def send(self, wanted: Setpoint) -> float:
+        """SET_ATTITUDE_TARGET with body rates and thrust; the thrust set-point, 0 to 1."""
         curve = self.stack.thrust_curve
         if curve is None:
             curve = self.telemetry.parameters.get(self.dialect.thrust_parameter or "", 0.0)
+        thrust = thrust_setpoint(wanted.thrust, self._full, curve)
         milliseconds = round(self.stack_time * 1e3) & 0xFFFFFFFF
         self.pack(
             mavlink.MAVLink_set_attitude_target_message(
@@ -174,16 +209,39 @@ class Flight:
                 RATES_ONLY,
                 [1.0, 0.0, 0.0, 0.0],
                 *flu_to_frd(wanted.rates),
-                thrust_setpoint(wanted.thrust, self._full, curve),
+                thrust,
             )
         )
+        return thrust
+
+    def _send_position(self, baseline: Baseline, law: CompanionLaw, time_s: float) -> None:
+        """SET_POSITION_TARGET_LOCAL_NED of the vehicle."""
+        wanted = target(baseline, law, self.vehicle.hover_length, time_s)
+        yaw = float(law.path["yaw"][0])
+        milliseconds = round(self.stack_time * 1e3) & 0xFFFFFFFF
+        self.pack(message(wanted, self._stack_frame(), yaw, milliseconds, self.system))
+
+    def _stack_frame(self) -> Triple:
+        """Where the origin of the state's frame is in the stack's local one, m ENU."""
+        if not self.source.in_world:
+            return (0.0, 0.0, 0.0)
+        home = self.vehicle.home
+        found = self.telemetry.local(Geodetic(home.latitude, home.longitude, home.altitude))
+        return (0.0, 0.0, 0.0) if found is None else found
 
     def fly(self, estimate: Array) -> None:
         """One step of the law."""
         assert self.law is not None
         assert self.begin_time is not None
         time_s = self.stack_time - self.begin_time
-        self.send(self.law.step(estimate, time_s))
+        wanted = self.law.step(estimate, time_s)
+        if self.baseline is not None:
+            self._send_position(self.baseline, self.law, time_s)
+        elif self.probe is None or self.state is not State.FLYING:
+            self.send(wanted)
+        else:
+            wanted = self.probe.excited(wanted, time_s)
+            self.probe.note(time_s, self.send(wanted), wanted, estimate, self.telemetry)
         self.steps += 1
         if self.state is State.FLYING:
             self.last_step = Step(time_s, estimate, self.law.reference)

@@ -11,15 +11,15 @@ then the deviation of the lagging thrust, N.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
 
 from controller.design.lqr import SampledGain, Weights, sampled_gain, sampled_model
 from controller.design.model import LinearModel, linear_model, with_integrator
-from controller.law.flatness import STENCIL, body, flat_motion
-from controller.law.reference import Path
+from controller.law.flatness import STENCIL, body
+from controller.law.reference import DERIVATIVES, Path, path_derivatives
 from controller.law.state import (
     BODY_RATES,
     EULER_ANGLES,
@@ -31,6 +31,7 @@ from controller.law.state import (
     WRENCH_SIZE,
     Array,
 )
+from controller.over.motion import path_motion
 from controller.over.stack import Stack
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -61,14 +62,18 @@ def companion_model(vehicle: Vehicle, stack: Stack) -> LinearModel:
     return LinearModel(a, b)
 
 
-def companion_weights(vehicle: Vehicle) -> Weights:
-    """By largest acceptable deviation (Bryson's rule)."""
+def companion_weights(vehicle: Vehicle, accurate: bool = True) -> Weights:
+    """By largest acceptable deviation (Bryson's rule).
+
+    accurate: the state is known to centimetres. Otherwise the load's place counts less: a tight loop would
+    turn the decimetres by which a stack's position wanders into swing.
+    """
     deviations = np.full(STATE_SIZE + 1 + 3, math.inf)
-    deviations[LOAD_POSITION] = 0.5  # m
+    deviations[LOAD_POSITION] = 0.5 if accurate else 1.0  # m
     deviations[VEHICLE_VELOCITY] = deviations[LOAD_VELOCITY] = 0.6  # m/s
     deviations[BODY_RATES] = 2.0  # rad/s
     deviations[EULER_ANGLES] = (0.5, 0.5, 0.4)  # rad
-    deviations[STATE_SIZE + 1 :] = 0.8  # m s
+    deviations[STATE_SIZE + 1 :] = 0.8 if accurate else 2.0  # m s
     mass = vehicle.airframe.mass + vehicle.load.mass
     efforts = np.array([mass * 2.0, 1.2, 1.2, 0.6])  # N, rad/s
     on_states = np.where(np.isinf(deviations), 1e-6, deviations**-2.0)
@@ -87,12 +92,12 @@ class Design(NamedTuple):
     """Share of the thrust's lag that is left after a period."""
 
 
-def design(vehicle: Vehicle, stack: Stack, rate_hz: float = RATE_HZ) -> Design:
-    """Gains for a vehicle over a stack, at the law's rate."""
+def design(vehicle: Vehicle, stack: Stack, accurate: bool = True, rate_hz: float = RATE_HZ) -> Design:
+    """Gains for a vehicle over a stack, at the law's rate; accurate: as in `companion_weights`."""
     period = 1.0 / rate_hz
     delay = max(0, round(stack.delay / period))
     model = with_integrator(companion_model(vehicle, stack), LOAD_POSITION)
-    gain = sampled_gain(sampled_model(model, companion_weights(vehicle), period), delay)
+    gain = sampled_gain(sampled_model(model, companion_weights(vehicle, accurate), period), delay)
     return Design(gain, period, delay, math.exp(-period / stack.thrust_lag))
 
 
@@ -118,12 +123,20 @@ class CompanionLaw:
 
     def __init__(self, vehicle: Vehicle, stack: Stack, design: Design, path: Path) -> None:
         self._design = design
-        self.path = path
-        self._body: Any = np.array([body(vehicle)]).view(np.recarray)[0]
+        self._path = path.copy()
         self._lead = design.delay * design.period + 0.5 * design.period
         self._thrust_lead = self._lead + stack.thrust_lag
         self._rate_lead = self._lead + stack.rate_lag
-        self._stencil: Any = np.zeros(1, STENCIL).view(np.recarray)[0]
+        self._heading = np.zeros(2)
+        self._state, self._wrench = np.zeros(STATE_SIZE), np.zeros(WRENCH_SIZE)
+        self._motion = path_motion.bind(
+            np.array([body(vehicle)]),
+            self._path,
+            np.zeros(1, STENCIL),
+            self._heading,
+            self._state,
+            self._wrench,
+        )
         self._integral = np.zeros(3)
         self._thrust = 0.0  # deviation of the lagging thrust from u*, N
         self._past = np.zeros((max(1, design.delay), WRENCH_SIZE))
@@ -153,15 +166,34 @@ class CompanionLaw:
         self.terms = Terms(feedforward, proportional, integral)
         return Setpoint(float(given[0]), (float(given[1]), float(given[2]), float(given[3])))
 
+    @property
+    def path(self) -> Path:
+        """The reference's path (1,); its owner may write to it."""
+        return self._path
+
+    @path.setter
+    def path(self, path: Path) -> None:
+        self._path[:] = path
+
+    def desired(self, time_s: float, lead: float = 0.0) -> Array:
+        """x* (18,): the state that belongs to the path at a time; the wrench is that of `lead` s later."""
+        yaw = float(self._path["yaw"][0])
+        self._heading[:] = math.cos(yaw), math.sin(yaw)
+        self._motion(time_s, lead)
+        return self._state.copy()
+
+    def raw(self, time_s: float) -> Array:
+        """(3,), m: where the load is to be at a time, as it is set, without a smooth start."""
+        derivatives = np.zeros((DERIVATIVES + 1, 3))
+        path_derivatives(self._path.view(np.recarray)[0], time_s, derivatives)
+        position: Array = derivatives[0]
+        return position
+
     def _feedforward(self, time_s: float) -> tuple[Array, Array]:
         """x* (18,) now, and u* (4,): the thrust and the rates that are needed once they act."""
-        path: Any = self.path.view(np.recarray)[0]
-        heading = np.array([math.cos(path.yaw), math.sin(path.yaw)])
-        ahead, desired = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE)
-        wrench = np.zeros(WRENCH_SIZE)
-        flat_motion(self._body, path, time_s + self._rate_lead, 0.0, heading, self._stencil, ahead, wrench)
-        flat_motion(self._body, path, time_s, self._thrust_lead, heading, self._stencil, desired, wrench)
-        return desired, np.concatenate((wrench[:1], ahead[BODY_RATES]))
+        rates = self.desired(time_s + self._rate_lead)[BODY_RATES]
+        desired = self.desired(time_s, self._thrust_lead)
+        return desired, np.concatenate((self._wrench[:1], rates))
 
     def _limited(self, wanted: Array) -> Array:
         """Within what a stack is asked for at most."""
@@ -197,9 +229,9 @@ def _in_heading(deviation: Array, yaw: float) -> Array:
     return out
 
 
-def stable(vehicle: Vehicle, stack: Stack, rate_hz: float = RATE_HZ) -> float:
+def stable(vehicle: Vehicle, stack: Stack, accurate: bool = True, rate_hz: float = RATE_HZ) -> float:
     """Spectral radius of the closed sampled loop, delay included: below 1 it is stable."""
-    found = design(vehicle, stack, rate_hz)
+    found = design(vehicle, stack, accurate, rate_hz)
     model = with_integrator(companion_model(vehicle, stack), LOAD_POSITION)
     n, m = model.B.shape
     transition = linalg.expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * found.period)

@@ -12,8 +12,11 @@ import numpy as np
 
 from controller.feedback.truth import PathFrom
 from controller.law.state import LOAD_POSITION
+from controller.over.ages import Ages
+from controller.over.baseline import Baseline
 from controller.over.companion import Companion
 from controller.over.flight import Flight, State, Step
+from controller.over.identify.probe import Probe
 from controller.over.load.source import TruthSource, load_source
 from controller.over.stack import Stack
 from sitl_bridge.mavlink.framing import split
@@ -56,6 +59,10 @@ class OverOptions:
     out: Path | None = None
     wait_s: float = math.inf
     """How long to wait for the stack."""
+    probe: Probe | None = None
+    """Measures how the stack follows, while the reference is flown."""
+    baseline: Baseline | None = None
+    """Let the stack's own position control fly instead of the law."""
 
 
 class Report:
@@ -116,7 +123,15 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     source = load_source(options.load, options.vehicle)
     plant = source if isinstance(source, TruthSource) else None if truth is None else TruthSource()
     flight = Flight(
-        options.vehicle, options.stack, source, options.path_from, options.duration_s, speaker.say
+        options.vehicle,
+        options.stack,
+        source,
+        options.path_from,
+        options.duration_s,
+        speaker.say,
+        options.probe,
+        options.baseline,
+        Ages(lambda: None if plant is None else plant.time_s),
     )
     companion = Companion(flight, options.wait_s)
     report = Report(flight, plant, speaker)

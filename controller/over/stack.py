@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -16,16 +17,18 @@ from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 from sitl_bridge.vehicle.schema import Section, quantity
 
+Kind = Literal["px4", "ardupilot"]
+
 
 class Stack(Section):
     """A flight stack as the companion's model has it."""
 
-    kind: Literal["px4", "ardupilot"] = quantity("-", "whose modes and conventions it has", "px4")
+    kind: Kind = quantity("-", "whose modes and conventions it has", "px4")
     rate_lag: float = quantity(
         "s", "first-order lag of the body rates behind their set-points", 0.06, gt=0, le=1
     )
-    thrust_lag: float = quantity("s", "first-order lag of the thrust behind its set-point", 0.05, gt=0, le=1)
-    delay: float = quantity("s", "dead time of link and loop, before the lags", 0.02, ge=0, le=0.5)
+    thrust_lag: float = quantity("s", "first-order lag of the thrust behind its set-point", 0.01, gt=0, le=1)
+    delay: float = quantity("s", "dead time of link and loop, before the lags", 0.03, ge=0, le=0.5)
     full_thrust: float | None = quantity(
         "N", "at a set-point of 1; None: all rotors at full speed", None, gt=0
     )
@@ -65,3 +68,17 @@ def read_stack(file: Path) -> Stack:
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
         raise DescriptionError(str(file), lines) from None
+
+
+def stack_text(stack: Stack, remarks: Sequence[str]) -> str:
+    """The file that `read_stack` reads; remarks: lines for a person, on top."""
+    lines = [f"# {remark}" for remark in remarks]
+    for name, field in Stack.model_fields.items():
+        value = getattr(stack, name)
+        if value is None:
+            continue
+        extra = field.json_schema_extra
+        unit = extra["unit"] if isinstance(extra, dict) else "-"
+        text = f'"{value}"' if isinstance(value, str) else repr(value)
+        lines.append(f"{name} = {text}".ljust(24) + ("" if unit == "-" else f"# {unit}"))
+    return "\n".join(line.rstrip() for line in lines) + "\n"

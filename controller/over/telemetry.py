@@ -122,8 +122,7 @@ class Telemetry:
     """Whether the vehicle's state is newer than the last time somebody cleared this."""
     _attitude: Quaternion | None = None
     _rates: Triple = (0.0, 0.0, 0.0)
-    has_imu: bool = False
-    """Whether there has been a HIGHRES_IMU."""
+    last_imu: ImuSample | None = None
     _has_odometry: bool = False
     _text_parts: dict[int, str] = field(default_factory=dict)
     """Of STATUSTEXTs that come in several frames, by their id."""
@@ -187,8 +186,8 @@ class Telemetry:
     def _on_imu(self, frame: Frame, message: Any, now: float) -> None:
         force = flu_to_frd((message.xacc, message.yacc, message.zacc))
         if all(map(math.isfinite, force)):
-            self.has_imu = True
-            self.imu.append(ImuSample(message.time_usec * 1e-6, force))
+            self.last_imu = ImuSample(message.time_usec * 1e-6, force)
+            self.imu.append(self.last_imu)
 
     def _on_origin(self, frame: Frame, message: Any, now: float) -> None:
         self.origin = LocalOrigin(
@@ -200,12 +199,6 @@ class Telemetry:
     def _on_global_position(self, frame: Frame, message: Any, now: float) -> None:
         self.altitude_msl = message.alt / MILLIMETRES_PER_METRE
         self.home_altitude = self.altitude_msl - message.relative_alt / MILLIMETRES_PER_METRE
-
-    def state_age(self, now: float) -> float:
-        """Age of the vehicle's state, s: since it came, and by the clocks where they keep pace."""
-        if self.vehicle is None:
-            return math.inf
-        return max(now - self.vehicle_at, self.clock.age(self.vehicle.time_s, now) or 0.0)
 
     def _on_home(self, frame: Frame, message: Any, now: float) -> None:
         place = (message.x, message.y, message.z)

@@ -16,9 +16,8 @@ from sitl.command_line.argument_types import (
     stack_address,
     whole,
 )
-from sitl.command_line.completion import add_completion
-from sitl.command_line.doctor import add_doctor
 from sitl.command_line.export import add_export
+from sitl.command_line.identify import add_identify
 from sitl.command_line.sweep import add_sweep
 from sitl.command_line.view import add_view
 from sitl.command_line.warmup import add_warmup
@@ -127,8 +126,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_view(commands)
     add_sweep(commands)
     add_warmup(commands)
-    add_doctor(commands)
-    add_completion(commands)
+    add_identify(commands, (_vehicle, _instance, _over))
     bench = commands.add_parser(
         "bench",
         help="measure speed, and print ratios against the bare round trip",
@@ -204,19 +202,23 @@ def _link(parser: argparse.ArgumentParser) -> None:
         f"(default: UDP 127.0.0.1:{HIL_UDP_PORT}+N, where the controller waits and the plant sends first; "
         f"an address may leave out its port, {HIL_TCP_PORT}+N for TCP, and host)",
     )
-    parser.add_argument(
-        "--instance",
-        metavar="N",
-        type=whole(0, MOST_INSTANCES - 1, "an instance"),
-        default=0,
-        help="number of this vehicle: shifts ports and MAVLink ids (default: 0)",
-    )
+    _instance(parser)
     parser.add_argument(
         "--drop",
         metavar="PERCENT",
         type=number(0, 90, "a percentage"),
         default=0.0,
         help="lose so many HIL datagrams each way, seeded",
+    )
+
+
+def _instance(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--instance",
+        metavar="N",
+        type=whole(0, MOST_INSTANCES - 1, "an instance"),
+        default=0,
+        help="number of this vehicle: shifts ports and MAVLink ids (default: 0)",
     )
 
 
@@ -276,6 +278,12 @@ def _over(parser: argparse.ArgumentParser) -> None:
         "arranges it)",
     )
     group.add_argument("--stack", metavar="FILE", type=Path, help="lags, delay and thrust of the stack, TOML")
+    group.add_argument(
+        "--baseline",
+        choices=("point", "motion"),
+        help="for comparison: let the stack's own position control fly the vehicle, to the raw set-point or "
+        "along the smooth motion",
+    )
     group.add_argument(
         "--wait",
         metavar="S",

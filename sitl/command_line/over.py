@@ -17,6 +17,8 @@ from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
+    from controller.feedback.truth import PathFrom
+    from controller.over.run import OverOptions
     from sitl.command_line.commands import Timing
     from sitl.flights.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
@@ -30,10 +32,34 @@ def _stack_address(arguments: argparse.Namespace) -> Address:
     return parse_stack_address(arguments.over, STACK_UDP_PORT + arguments.instance, STACK_TCP_PORT)
 
 
+def over_options(
+    arguments: argparse.Namespace, vehicle: Vehicle, path_from: PathFrom, duration_s: float
+) -> OverOptions:
+    """What the flags of a companion ask for. Raises DescriptionError."""
+    from controller.over.baseline import Baseline
+    from controller.over.run import OverOptions
+    from controller.over.stack import Stack, read_stack
+
+    truth = None
+    if arguments.load == "truth" or arguments.truth_from is not None:
+        truth = parse_address(arguments.truth_from or "udpin", TRUTH_PORT, TRUTH_PORT)
+    return OverOptions(
+        vehicle=vehicle,
+        over=_stack_address(arguments),
+        path_from=path_from,
+        duration_s=duration_s,
+        stack=Stack() if arguments.stack is None else read_stack(arguments.stack),
+        load=arguments.load,
+        truth=truth,
+        out=arguments.out,
+        wait_s=arguments.wait,
+        baseline=None if arguments.baseline is None else Baseline(arguments.baseline),
+    )
+
+
 def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario | None) -> int:
     """Fly one reference over a stack; exit code 1 when it did not come to its end."""
-    from controller.over.run import OverOptions, run
-    from controller.over.stack import Stack, read_stack
+    from controller.over.run import run
     from sitl.flights.refusals import check_feasible
     from sitl.flights.scenario import GroundControl, Hover
 
@@ -44,26 +70,11 @@ def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario
         )
     if scenario is not None:
         check_feasible(scenario, vehicle, "default")
-    truth = None
-    if arguments.load == "truth" or arguments.truth_from is not None:
-        truth = parse_address(arguments.truth_from or "udpin", TRUTH_PORT, TRUTH_PORT)
+    duration = arguments.duration or (scenario.duration if scenario else None) or DEFAULT_DURATION
+    options = over_options(arguments, vehicle, reference.path, duration)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
-    outcome = run(
-        OverOptions(
-            vehicle=vehicle,
-            over=_stack_address(arguments),
-            path_from=reference.path,
-            duration_s=arguments.duration or (scenario.duration if scenario else None) or DEFAULT_DURATION,
-            stack=Stack() if arguments.stack is None else read_stack(arguments.stack),
-            load=arguments.load,
-            truth=truth,
-            out=arguments.out,
-            wait_s=arguments.wait,
-        ),
-        Speaker("controller", events=arguments.until_eof),
-        stop,
-    )
+    outcome = run(options, Speaker("controller", events=arguments.until_eof), stop)
     if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
     return 0 if outcome["completed"] else FAILED
@@ -109,6 +120,7 @@ def fly_over_stack(
         hil=hil,
         over=str(_stack_address(arguments)),
         load=arguments.load,
+        baseline=arguments.baseline,
         stack=arguments.stack,
         clock=timing.clock,
         speed=timing.speed,

@@ -44,6 +44,8 @@ class OverFlight:
     over: str
     """The stack's MAVLink, an address."""
     load: str
+    baseline: str | None
+    """Who flies instead of the law, for comparison; see `controller.over.baseline`."""
     stack: Path | None
     clock: str
     speed: float | None
@@ -109,6 +111,8 @@ class OverFlight:
             companion += ["--set", text]
         companion += ["--over", self.over, "--load", self.load, "--wait", repr(self.wait_s)]
         companion += ["--truth-from", f"udpin:127.0.0.1:{truth_port}", "--out", str(out)]
+        if self.baseline is not None:
+            companion += ["--baseline", self.baseline]
         if self.stack is not None:
             companion += ["--stack", str(self.stack)]
         return plant, companion
@@ -194,6 +198,7 @@ def _facts(options: OverFlight, account: Account, failure: str | None) -> dict[s
         "over": {
             "address": options.over,
             "load": options.load,
+            "baseline": options.baseline,
             "took_over_at_s": account.scenario_time("flying"),
             "handed_back_at_s": account.scenario_time("handing_back"),
             "control_steps": account.companion_end.get("control_steps"),

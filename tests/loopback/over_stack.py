@@ -48,9 +48,12 @@ class StandIn:
         return f"udpin:127.0.0.1:{self.onboard_peer}"
 
     def start_companion(self, *arguments: str, over: str | None = None) -> Process:
-        """A companion that flies the step on truth."""
+        """A companion that holds the load on truth.
+
+        A stack turns on with the last body rates until it notices that there are no more: in hover with none.
+        """
         truth = ("--load", "truth", "--truth-from", f"udpin:127.0.0.1:{self.truth}")
-        reference = ("--scenario", str(self.step), *IRIS)
+        reference = ("--scenario", "hover", *IRIS)
         return self._start("controller", *reference, "--over", over or self.over, *truth, *arguments)
 
 

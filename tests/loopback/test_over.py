@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controller.over.stack import read_stack
 from sitl.flights.free_ports import free_ports
 from sitl.flights.report import positions, read_state_log
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.loopback.conftest import Process
 from tests.loopback.over_stack import IRIS, SerialLine, StandIn
 from tests.loopback.pymav import HOLD, PyMav
@@ -125,3 +127,26 @@ def test_what_does_not_go_together_is_one_line(start: Start, arguments: tuple[st
     assert output == ""
     assert words in errors
     assert "Traceback" not in errors
+
+
+@pytest.mark.timeout(400)
+def test_identify_finds_the_rotors_lag_and_thrust(start: Start, tmp_path: Path) -> None:
+    """One and a half times the usual lag of the rotors, of which autopilot and companion know nothing."""
+    stand_in = StandIn(start, tmp_path)
+    slow = [flag for i in range(4) for flag in ("--set", f"rotors.{i}.time_constant=0.03")]
+    stand_in.start_plant(*slow)
+    stand_in.start_stack()
+    file = tmp_path / "stack.toml"
+    code, output, errors = start(
+        *("identify", *IRIS, "--over", stand_in.over, "--load", "truth", "--json", "--out", str(file)),
+        *("--truth-from", f"udpin:127.0.0.1:{stand_in.truth}", "--duration", "30"),
+    ).finish()
+    assert code == 0, errors
+    found = json.loads(output)
+    assert found["responses"]["thrust"]["lag"] == pytest.approx(0.03, rel=0.15)
+    rotors = load_vehicle("iris").rotors
+    full = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in rotors)
+    assert found["full_thrust"] == pytest.approx(full, rel=0.05)
+    assert found["rate_lag"] + found["delay"] > 0.06
+    stack = read_stack(file)
+    assert stack.model_dump() == {key: found[key] for key in stack.model_dump()}

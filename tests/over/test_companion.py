@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.over.ages import LONGEST_STANDSTILL, Ages
 from controller.over.flight import State
 from controller.over.law import stable
 from controller.over.load.pendulum_filter import PendulumFilter
@@ -27,12 +28,13 @@ from tests.over.played import HOLD, IRIS, LAND, MANUAL, Played
     thrust_lag=st.floats(0.02, 0.1),
     delay=st.floats(0.0, 0.06),
     length=st.floats(0.5, 15.0),
+    accurate=st.booleans(),
 )
 def test_the_sampled_loop_is_stable_for_stacks_and_cables(
-    rate_lag: float, thrust_lag: float, delay: float, length: float
+    rate_lag: float, thrust_lag: float, delay: float, length: float, accurate: bool
 ) -> None:
     vehicle = load_vehicle("iris", ["initial.start=hover", f"cable.rest_length={length}"])
-    assert stable(vehicle, Stack(rate_lag=rate_lag, thrust_lag=thrust_lag, delay=delay)) < 1.0
+    assert stable(vehicle, Stack(rate_lag=rate_lag, thrust_lag=thrust_lag, delay=delay), accurate) < 1.0
 
 
 @given(force=st.floats(0.5, 28.0), curve=st.floats(0.0, 1.0))
@@ -175,3 +177,18 @@ def test_clocks_that_do_not_keep_pace_tell_no_age() -> None:
     age = steady.age(100.0 + 4.3, 4.5)
     assert age == pytest.approx(0.2, abs=1e-3)
     assert slow.age(100.0, 4.5) is None
+
+
+def test_nothing_ages_while_a_simulated_world_stands_still() -> None:
+    world: list[float | None] = [None]
+    ages = Ages(lambda: world[0])
+    assert ages.age("state", 0.0) == math.inf
+    ages.mark("state", 10.0)
+    assert ages.age("state", 10.5) == pytest.approx(0.5)  # no world is known
+    world[0] = 3.0
+    ages.mark("state", 11.0)
+    assert ages.age("state", 11.5) == 0.0
+    world[0] = 3.3
+    assert ages.age("state", 11.5) == pytest.approx(0.3)
+    assert ages.age("state", 11.2) == pytest.approx(0.2)  # faster than real time
+    assert ages.age("state", 11.0 + 2.1 * LONGEST_STANDSTILL) > LONGEST_STANDSTILL  # dead

@@ -28,6 +28,7 @@ from sitl_bridge.frames import (
     DEG_E7_PER_DEG,
     MILLIMETRES_PER_METRE,
     Geodetic,
+    Triple,
     attitude_to_enu_flu,
     enu_to_ned,
     euler_from_quaternion,
@@ -42,6 +43,8 @@ LOAD_GPS_DEVIATION = 0.5
 """m, of the load's own position messages."""
 MOST_TRUTH_AGE = 0.2
 """s"""
+SMOOTHING_TIME = 2.5
+"""s, in which a jump of the stack's position is followed."""
 MOST_POSITION_AGE = 2.0
 """s"""
 
@@ -128,13 +131,14 @@ class FilteredSource:
         self._uses_position = uses_position
         self._filter: PendulumFilter | None = None
         self._time: float | None = None
+        self._place: Array = np.zeros(3)
         self._heard: list[Any] = []
         self._heard_at = -math.inf
 
     def missing(self, telemetry: Telemetry, now: float) -> str | None:
         """HIGHRES_IMU; with the load's position that one, and where the stack's local frame is."""
         wanted = []
-        if not telemetry.has_imu:
+        if telemetry.last_imu is None:
             wanted.append("the stack's HIGHRES_IMU")
         if self._uses_position and telemetry.origin is None:
             wanted.append("the stack's GPS_GLOBAL_ORIGIN")
@@ -155,20 +159,33 @@ class FilteredSource:
         if vehicle is None:
             return None
         if self._filter is None or self._time is None or not 0.0 <= vehicle.time_s - self._time < 1.0:
+            self._place = np.array(vehicle.position)
             self._filter = PendulumFilter(self._vehicle, vehicle.position, vehicle.velocity)
         else:
-            self._filter.predict(vehicle.position, vehicle.velocity, vehicle.time_s - self._time)
+            duration = vehicle.time_s - self._time
+            drift = (np.array(vehicle.position) - self._place) / SMOOTHING_TIME
+            self._place += duration * (np.array(vehicle.velocity) + drift)
+            self._filter.predict(self._at, vehicle.velocity, duration)
         self._time = vehicle.time_s
         if telemetry.imu:
             sample = telemetry.imu[-1]
             telemetry.imu.clear()
-            self._filter.feel(vehicle.attitude, vehicle.position, vehicle.velocity, sample.specific_force)
-        self._take_positions(telemetry)
+            self._filter.feel(vehicle.attitude, self._at, vehicle.velocity, sample.specific_force)
+        self._take_positions(telemetry, self._filter)
         out = law_state(vehicle)
+        out[VEHICLE_POSITION] = self._place
         out[LOAD_POSITION], out[LOAD_VELOCITY] = self._filter.state[0:3], self._filter.state[3:6]
         return out
 
-    def _take_positions(self, telemetry: Telemetry) -> None:
+    @property
+    def _at(self) -> Triple:
+        """Where the vehicle is, m: by its velocity at once, by its position slowly. GPS noise, of which a
+        stack's position has more than its velocity, neither shakes the cable nor makes the law lean.
+        """
+        east, north, up = self._place.tolist()
+        return (east, north, up)
+
+    def _take_positions(self, telemetry: Telemetry, found: PendulumFilter) -> None:
         heard, self._heard = self._heard, []
         for message in heard[-1:]:
             point = Geodetic(
@@ -177,10 +194,10 @@ class FilteredSource:
                 message.alt / MILLIMETRES_PER_METRE,
             )
             place = telemetry.local(point)
-            if place is not None and self._filter is not None:
+            if place is not None:
                 speeds = (message.vx, message.vy, message.vz)
                 north, east, down = (v / CENTIMETRES_PER_METRE for v in speeds)
-                self._filter.see(place, LOAD_GPS_DEVIATION, enu_to_ned((north, east, down)))
+                found.see(place, LOAD_GPS_DEVIATION, enu_to_ned((north, east, down)))
 
 
 def load_source(kind: str, vehicle: Vehicle) -> LoadSource:

@@ -19,6 +19,8 @@ STREAMS = (
 )
 ASKED_FOR = (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
 """By MAV_CMD_REQUEST_MESSAGE: not every stack streams them."""
+LONGEST_PATIENCE = 0.3
+"""s, of a stack whose set-points stop; at 1 rad/s it then leans by 17° more."""
 CLEARANCE = 2.5
 """m, of the load above the ground after take-off."""
 OFF_THE_GROUND = 0.5
@@ -45,13 +47,20 @@ def prepare(flight: Flight, now: float) -> None:
             flight.pack(dialects.message_interval(flight.system, message_id, rate))
         for message_id in ASKED_FOR:
             flight.pack(dialects.request_message(flight.system, message_id))
-        if flight.dialect.thrust_parameter is not None:
-            name = flight.dialect.thrust_parameter.encode()
-            flight.pack(mavlink.MAVLink_param_request_read_message(flight.system, 1, name, -1))
+        for name in (flight.dialect.thrust_parameter, flight.dialect.patience_parameter):
+            if name is not None:
+                message = mavlink.MAVLink_param_request_read_message(flight.system, 1, name.encode(), -1)
+                flight.pack(message)
     t.acks.clear()
     flight.missing = _missing(flight, now)
     if flight.missing:
         return
+    patience = t.parameters.get(flight.dialect.patience_parameter or "", 0.0)
+    if patience > LONGEST_PATIENCE:
+        flight.say(
+            f"{flight.dialect.patience_parameter} is {patience:g} s: should this companion die, the vehicle "
+            f"turns on with its last rates for so long; {LONGEST_PATIENCE:g} s is safer"
+        )
     flying = t.armed and t.landed == mavlink.MAV_LANDED_STATE_IN_AIR
     flight.go(State.STREAMING if flying else State.ARMING, now)
 

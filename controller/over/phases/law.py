@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from controller.design.ramp import planned
-from controller.law.reference import Path, setpoint
+from controller.law.reference import setpoint
 from controller.law.state import (
     EULER_ANGLES,
     LOAD_POSITION,
@@ -16,7 +16,7 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
-from controller.over.flight import Flight, State, moved
+from controller.over.flight import Flight, State
 from controller.over.law import CompanionLaw
 
 LONGEST_STATE_AGE = 0.2
@@ -43,24 +43,21 @@ def stream(flight: Flight, now: float) -> None:
     estimate = flight.new_estimate(now)
     if estimate is None:
         return
-    if flight.path is None:
-        flight.path = _plan(flight, estimate)
+    if flight.ramp_time is None:
+        flight.ramp_time = _plan(flight, estimate)
         flight.since = now
     flight.send(flight.hover_setpoint())
     if now - flight.since > STREAM_TIME:
         flight.go(State.TAKING_OVER, now)
 
 
-def _plan(flight: Flight, estimate: Array) -> Path:
-    """The reference's path. It takes tenths of a second, as does the law's first step: both come before
-    anything depends on them.
+def _plan(flight: Flight, estimate: Array) -> float:
+    """Ramp time of the reference, s. This takes tenths of a second, as does the law's first step: both come
+    before anything depends on them.
     """
-    x, y, z = estimate[LOAD_POSITION].tolist()
-    east, north, up = origin = flight.world_origin()
-    path = planned(moved(flight.path_from((x - east, y - north, z - up)), origin), flight.vehicle)
-    path["start"] = (x, y, z)
+    path = planned(flight.reference(estimate[LOAD_POSITION]), flight.vehicle)
     CompanionLaw(flight.vehicle, flight.stack, flight.design, path).step(estimate, 0.0)
-    return path
+    return float(path["ramp_time"][0])
 
 
 def take_over(flight: Flight, now: float) -> None:
@@ -113,10 +110,10 @@ def steady(flight: Flight, now: float) -> None:
 def _begin(flight: Flight, now: float) -> None:
     """The reference begins where the load is held; what the law has integrated stays."""
     assert flight.law is not None
-    assert flight.path is not None
-    flight.path["start"] = flight.law.reference
-    flight.path["yaw"] = flight.law.path["yaw"]
-    flight.law.path, flight.begin_time = flight.path, flight.stack_time
+    assert flight.ramp_time is not None
+    path = flight.reference(flight.law.reference)
+    path["ramp_time"], path["yaw"] = flight.ramp_time, flight.law.path["yaw"]
+    flight.law.path, flight.begin_time = path, flight.stack_time
     flight.say("flying the load")
     flight.go(State.FLYING, now)
 
@@ -148,9 +145,9 @@ def _fit_estimate(flight: Flight, now: float) -> Array | None:
 
 def unfit(flight: Flight, estimate: Array | None, now: float) -> str | None:
     """Why the law must not go on; None: it may."""
-    if flight.telemetry.state_age(now) > LONGEST_STATE_AGE:
+    if flight.state_age(now) > LONGEST_STATE_AGE:
         return f"the stack's state is older than {LONGEST_STATE_AGE} s"
-    if now - flight.estimated_at > LONGEST_STATE_AGE:
+    if flight.ages.age("estimate", now) > LONGEST_STATE_AGE:
         what = flight.source.missing(flight.telemetry, now) or "nothing is known of it"
         return f"the load's state is older than {LONGEST_STATE_AGE} s ({what})"
     if estimate is None:
