@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 
-from sitl.exit_codes import INTERRUPTED
+from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
 
 
 def main() -> int:
@@ -26,8 +26,22 @@ def _command() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # What imports build stays; looking through it for garbage again and again is a tenth of the start.
     gc.disable()
-    from sitl.command_line import commands
-
+    try:
+        from sitl.command_line import commands
+    except ModuleNotFoundError as error:
+        return _without(error)
     gc.freeze()
     gc.enable()
     return commands.main()
+
+
+def _without(error: ModuleNotFoundError) -> int:
+    """A required package is missing: only `sitl doctor` works."""
+    if sys.argv[1:2] != ["doctor"]:
+        print(f"sitl: {error.msg}; `{sys.executable} -m sitl doctor` says what to install", file=sys.stderr)
+        return USAGE
+    from sitl.doctor.run import examine
+
+    examine("--json" in sys.argv)
+    print(f"sitl: {error.msg}", file=sys.stderr)
+    return FAILED

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from controller.estimator import intake, step
 from controller.estimator.records import (
+    ACCELEROMETER,
     ALIGNING,
     ERROR_SIZE,
     FILTER,
     FLYING,
+    GYROSCOPE,
     INPUT,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
@@ -24,7 +26,9 @@ from controller.estimator.records import (
     PARTS,
     SENSORS,
     STANDING,
+    X_ACCEL_BIAS,
     X_ATTITUDE,
+    X_GYRO_BIAS,
     Array,
 )
 from controller.estimator.tuning import Tuning, parameters
@@ -35,6 +39,15 @@ Sequence3 = tuple[float, float, float] | Array
 
 REFUSED_TIME = 1.0
 """s for which GPS is refused, until that is a state of affairs and not an outlier."""
+
+
+DENIAL_TIME = 1.0
+"""s after a step of an inertial sensor, until its bias is what the other sensors leave of it."""
+UNUSUAL_BIAS = {
+    ACCELEROMETER: ("accel_bias", X_ACCEL_BIAS, 0.5),
+    GYROSCOPE: ("gyro_bias", X_GYRO_BIAS, 0.03),
+}
+"""Part of the error state, first index of the nominal state, and what is unusual at least, m/s² or rad/s."""
 
 
 class SensorHealth(NamedTuple):
@@ -50,6 +63,8 @@ class SensorHealth(NamedTuple):
     """mean normalised innovation squared per degree of freedom since the start; 1 when consistent"""
     within: float
     """share of innovations within their 95 % bounds since the start"""
+    offset: float = 0.0
+    """size of a bias that came at once and is not the sensor's usual one, rad/s or m/s²; 0: there is none"""
 
 
 class Health(NamedTuple):
@@ -281,6 +296,7 @@ class Estimator:
                 now - float(m["last_used"][index]),
                 float(m["nis_sum"][index]) / count if count else math.nan,
                 float(m["within"][index]) / max(1, int(m["seen"][index])),
+                self._offset(index),
             )
 
         def std(part: str, rows: slice) -> float:
@@ -310,6 +326,17 @@ class Estimator:
             load_resets=int(m["load_resets"]),
             sensors=sensors,
         )
+
+    def _offset(self, sensor: int) -> float:
+        """`SensorHealth.offset`: an unusual bias, once the other sensors have had time to deny it."""
+        if sensor not in UNUSUAL_BIAS:
+            return 0.0
+        part, start, least = UNUSUAL_BIAS[sensor]
+        usual = float(np.max(self._filter["p"][0]["initial_std"][PARTS[part]]))
+        size = float(np.max(np.abs(self.nominal[start : start + 3])))
+        stepped = float(self.memory["step_time"][sensor])
+        settled = stepped > 0.0 and float(self.memory["time"]) - stepped > DENIAL_TIME
+        return size if settled and size > max(least, 6.0 * usual) else 0.0
 
 
 def eq31_jacobian(roll: float, pitch: float) -> Array:

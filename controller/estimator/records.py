@@ -179,6 +179,12 @@ MEMORY = np.dtype(
         ("adrift", "b1"),
         ("height_suspicion", "f8"),  # running mean of normalised GPS height innovations
         ("turn_suspicion", "f8", 3),  # the same of the gyroscope's
+        ("last_rate", "f8", 3),
+        ("first_refused", "f8", 3),
+        ("first_jump", "f8", 3),
+        ("last_force_squares", "f8"),
+        ("taut_time", "f8"),
+        ("step_time", "f8", 2),  # when accelerometer and gyroscope were last wrong at once; 0: never
         ("test_ratio", "f8", SENSOR_COUNT),
         ("innovation", "f8", (SENSOR_COUNT, 3)),
         ("normalised", "f8", (SENSOR_COUNT, 3)),
@@ -198,6 +204,10 @@ something below has carried the vehicle or the load; hung: m, world, where the l
 weight, and how well that was known relative to the vehicle.
 last_change: of a sample from the one before; roughness: running mean of the change of that, in standard
 deviations of a live sensor's; last_fix: position and velocity of GPS, m and m/s.
+last_rate, first_refused: innovations of the gyroscope, rad/s, before and when it was first refused;
+first_jump: of that sample from the one before, rad/s;
+last_force_squares: normalised innovation squared of the accelerometer, three axes; taut_time: s for which the
+model's cable has been taut.
 innovation, normalised: the last ones of each sensor and axis, the second in standard deviations; seen,
 within: how many there were, and how many within the 95 % bounds; nis_*: squares of those that were used.
 """

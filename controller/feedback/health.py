@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED
+from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED, SENSORS
 from controller.feedback.assessment import Contact
 from controller.feedback.estimate import EstimateFeedback
 from controller.feedback.health_notices import HealthWatch, sensors_good
@@ -40,6 +40,7 @@ class EstimateAssessor:
         ready = self._feedback.ready() or self._feedback.estimator.flying
         for name, good in sensors_good(health).items():
             setattr(view.health, name, good)
+        view.health.wrong = next((name for name in SENSORS if health.sensors[name].offset > 0.0), "")
         view.health.attitude = health.attitude
         view.health.position = health.position and health.velocity and ready
         view.health.load = health.load or health.load_released or not view.cable_taut

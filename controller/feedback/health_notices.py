@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from controller.estimator.filter import Health
+from controller.estimator.filter import Health, SensorHealth
 
 SILENCE = {"gyroscope": 0.5, "accelerometer": 0.5, "magnetometer": 2.0, "barometer": 2.0, "gps": 2.0}
 """s without a sample that could be used, after which a sensor counts as lost."""
 TRACKER_SILENCE = 2.0
+_RIGHT = SensorHealth(0.0, 0, 0.0, 1.0, 1.0)
 
 
 class HealthWatch:
@@ -28,8 +29,12 @@ class HealthWatch:
     def _conditions(self, health: Health) -> dict[str, tuple[bool, str, str]]:
         conditions = {
             name: (not good, f"{_TITLES[name]} lost: {_EFFECTS[name]}", f"{_TITLES[name]} is back")
-            for name, good in sensors_good(health).items()
+            for name, good in _used(health).items()
         }
+        for name, unit in _INERTIAL.items():
+            offset = health.sensors[name].offset
+            wrong = f"{_TITLES[name]} wrong by {offset:.2g} {unit}: taken out"
+            conditions[f"{name} wrong"] = (offset > 0.0, wrong, f"{_TITLES[name]} is right again")
         conditions["glitch"] = (
             health.gps_refused,
             "GPS refused: it contradicts everything else",
@@ -49,6 +54,7 @@ _TITLES = {
     "barometer": "Barometer",
     "gps": "GPS",
 }
+_INERTIAL = {"accelerometer": "m/s^2", "gyroscope": "rad/s"}
 _EFFECTS = {
     "gyroscope": "the rates are the model's",
     "accelerometer": "the load is not seen",
@@ -59,6 +65,13 @@ _EFFECTS = {
 
 
 def sensors_good(health: Health) -> dict[str, bool]:
+    """Whether each sensor's samples are there, used, and right."""
+    return {
+        name: used and health.sensors.get(name, _RIGHT).offset == 0.0 for name, used in _used(health).items()
+    }
+
+
+def _used(health: Health) -> dict[str, bool]:
     """Whether each sensor's samples are there and used."""
     ages = {name: health.sensors[name].age for name in SILENCE if name != "gps"}
     ages["gps"] = min(health.sensors["gps_position"].age, health.sensors["gps_velocity"].age)

@@ -16,6 +16,8 @@ from sitl.command_line.argument_types import (
     stack_address,
     whole,
 )
+from sitl.command_line.completion import add_completion
+from sitl.command_line.doctor import add_doctor
 from sitl.command_line.export import add_export
 from sitl.command_line.identify import add_identify
 from sitl.command_line.sweep import add_sweep
@@ -126,6 +128,8 @@ def build_parser() -> argparse.ArgumentParser:
     add_view(commands)
     add_sweep(commands)
     add_warmup(commands)
+    add_doctor(commands)
+    add_completion(commands)
     add_identify(commands, (_vehicle, _instance, _over))
     bench = commands.add_parser(
         "bench",

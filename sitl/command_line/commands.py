@@ -1,4 +1,4 @@
-"""The `sitl` command: `plant`, `controller`, `fly SCENARIO`, `bench`, `paper`."""
+"""The `sitl` command: what each of its commands does."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from sitl.command_line.arguments import build_parser
+from sitl.command_line.completion import run_completion
+from sitl.command_line.doctor import run_doctor
 from sitl.command_line.export import run_export
 from sitl.command_line.identify import run_identify
 from sitl.command_line.sweep import run_sweep
@@ -284,6 +286,8 @@ COMMANDS = {
     "view": run_view,
     "sweep": run_sweep,
     "warmup": run_warmup,
+    "doctor": run_doctor,
+    "completion": run_completion,
     "identify": run_identify,
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from controller.estimator.correct.sudden_offset import note_step_of_force, note_step_of_rate, note_usual_rate
 from controller.estimator.correct.update import ROW, begin, fuse, inject, predicted_variance
 from controller.estimator.predict.forces import cable, drag_rate
 from controller.estimator.predict.rotation import matrix
@@ -168,7 +169,7 @@ def accelerometer(f: Filter, measured: Any) -> None:
         used += 1
     if used < 3:
         m.rejected[ACCELEROMETER] += 1
-    if not passes(f, ACCELEROMETER, worst):
+    if not note_step_of_force(f) and not passes(f, ACCELEROMETER, worst):
         return
     taut = m.tension > 0.0 and not p.two_way and m.vehicle_mode == FLYING
     before = along_cable(f)
@@ -262,6 +263,7 @@ def gyroscope(f: Filter, measured: Any) -> None:
         m.rejected[GYROSCOPE] += 1
         return
     noise = p.sensor_std[GYROSCOPE] * p.sensor_std[GYROSCOPE]
+    note_usual_rate(f)
     begin(f)
     worst, squares = 0.0, 0.0
     for axis in range(3):
@@ -272,7 +274,10 @@ def gyroscope(f: Filter, measured: Any) -> None:
     # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
     # widens the rates, it does not refuse what the gyroscope sees for long.
     if not passes(f, GYROSCOPE, worst):
-        if m.rejected_in_row[GYROSCOPE] < 3 or worst > 0.01 * GARBAGE:
+        if worst > 0.01 * GARBAGE:
+            return
+        note_step_of_rate(f)
+        if m.rejected_in_row[GYROSCOPE] < 3:
             return
         for axis in range(3):
             f.P[RATES + axis, RATES + axis] += (SUSPECTED_RATES * f.p.sensor_std[GYROSCOPE]) ** 2

@@ -125,6 +125,7 @@ def _slow(
         ("battery low", left < p["BAT_LOW_THR"]),
         ("battery critical", left < p["BAT_CRIT_THR"]),
         ("battery emergency", left < p["BAT_EMERGEN_THR"]),
+        ("inertial", view.health.wrong != ""),
         ("station", gone and p.integer("NAV_DLL_ACT") != 0),
         ("fence", p.integer("GF_ACTION") != 0 and bool(_outside(view, fence))),
     )
@@ -144,6 +145,10 @@ def _flight(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
 
 def _estimate(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
     return Trigger(Reaction.LAND, CRITICAL, "Position estimate lost: landing")
+
+
+def _inertial(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
+    return Trigger(Reaction.LAND, CRITICAL, f"{view.health.wrong.capitalize()} wrong: landing")
 
 
 def _offboard(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
@@ -200,6 +205,7 @@ _Maker = Callable[[VehicleView, Parameters, Fence], Trigger]
 _REACTIONS: dict[str, _Maker] = {
     "flight": _flight,
     "estimate": _estimate,
+    "inertial": _inertial,
     "offboard": _offboard,
     "sticks": _sticks,
     "station": _station,

@@ -72,6 +72,8 @@ class Health:
     attitude: bool = True
     position: bool = True
     load: bool = True
+    wrong: str = ""
+    """An inertial sensor with a lasting error, which is taken out; empty: there is none"""
 
 
 @dataclass(slots=True)
