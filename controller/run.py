@@ -62,7 +62,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     )
     most_steps = None if options.duration_s is None else round(options.duration_s * options.rate_hz)
     try:
-        _loop(session, link, most_steps, stop, guided)
+        _loop(session, link, most_steps, stop, guided, speaker)
     finally:
         if guided is not None:
             guided.close()
@@ -139,11 +139,17 @@ def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedbac
 
 
 def _loop(
-    session: HilSession, link: Link, most_steps: int | None, stop: StopRequest, guided: Guided | None
+    session: HilSession,
+    link: Link,
+    most_steps: int | None,
+    stop: StopRequest,
+    guided: Guided | None,
+    speaker: Speaker,
 ) -> None:
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     clock = AwakeClock(time.monotonic())
     now = time.monotonic()
+    mode = ""
     while stop.reason is None and (most_steps is None or session.steps < most_steps):
         deadline = session.next_deadline()
         if guided is None:
@@ -161,5 +167,8 @@ def _loop(
             guided.exchange(now, heard=received is not None)
             for datagram in guided.to_plant(now):
                 link.send(datagram)
+            if guided.mode_title != mode:
+                mode = guided.mode_title
+                speaker.event("mode", mode=mode)
             if guided.shut_down:
                 stop.reason = "a client's command to shut down"

@@ -240,6 +240,11 @@ class Station:
             self._send_streams(now)
 
     @property
+    def mode_title(self) -> str:
+        """The mode's name for a person; `disarmed` until it acts."""
+        return self.machine.mode.title if self.armed else "disarmed"
+
+    @property
     def armed(self) -> bool:
         """Whether the rotors may turn."""
         return self.machine.armed and not self.machine.terminated

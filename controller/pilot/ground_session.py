@@ -50,6 +50,11 @@ class Guided:
         return min(self._link.station.next_deadline(now), now + LONGEST_WAIT)
 
     @property
+    def mode_title(self) -> str:
+        """The vehicle's mode, for a person."""
+        return self._link.station.mode_title
+
+    @property
     def shut_down(self) -> bool:
         """Whether a client has asked for the end of the process."""
         return self._link.station.shut_down

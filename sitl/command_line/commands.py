@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -166,7 +167,7 @@ def _controller(arguments: argparse.Namespace) -> int:
 
         return run_over(arguments, vehicle, scenario)
     check_feasible(scenario, vehicle, arguments.design)
-    speaker = Speaker("controller", events=False)
+    speaker = Speaker("controller", events=arguments.until_eof)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
     reference = scenario.reference if scenario else Hover(kind="hover")
@@ -187,7 +188,7 @@ def _controller(arguments: argparse.Namespace) -> int:
         out=arguments.out,
     )
     outcome = run(options, speaker, stop)
-    if arguments.json:
+    if arguments.json and not arguments.until_eof:
         print(json.dumps(outcome, indent=2))
     return 0
 
@@ -249,7 +250,7 @@ def _fly(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(summary, indent=2))
     else:
-        print(table(summary))
+        print(table(summary, shutil.get_terminal_size((1000, 24)).columns))
         for file in written(out):
             print(f"  {file}")
     if stop:

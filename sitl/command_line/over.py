@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -102,7 +103,7 @@ def fly_over_stack(
     audience: Callable[[argparse.Namespace, Vehicle], AbstractContextManager[tuple[str, int] | None]],
 ) -> int:
     """`sitl fly --over`: launch plant and companion, and report; exit code 1 when the load did not settle."""
-    from sitl.flights.report import table, written
+    from sitl.flights.report import is_complete, table, written
     from sitl.flights.scenario import load_scenario
     from sitl.over.flight import OverFlight, fly_over
     from sitl.over.flight import table as table_of_step
@@ -141,8 +142,10 @@ def fly_over_stack(
     if arguments.json:
         print(json.dumps(summary, indent=2))
     else:
-        print(table(summary))
-        print(table_of_step(summary))
+        width = shutil.get_terminal_size((1000, 24)).columns
+        print(table(summary, width))
+        if is_complete(summary):
+            print(table_of_step(summary, width))
         for file in written(out):
             print(f"  {file}")
     if stop:

@@ -1,4 +1,4 @@
-"""One flight: two processes, a progress line, and the report."""
+"""One flight: two processes, their progress, and the report."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from controller.feedback.truth import estimates
+from sitl.flights.display import Display
 from sitl.flights.keep import keep_recording
-from sitl.flights.launch import Outcome, Pair, ProgressLine, watch
+from sitl.flights.launch import Outcome, Pair, watch
 from sitl.flights.refusals import check_feasible
 from sitl.flights.report import OF_THE_PLANT, clear, write_report
 from sitl.flights.scenario import (
@@ -24,6 +25,7 @@ from sitl.flights.scenario import (
     suited,
     usual_feedback,
 )
+from sitl.flights.status import Status, status_of
 from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest
@@ -148,7 +150,12 @@ def new_folder(folder: Path) -> Path:
     raise AssertionError("numbers do not end")
 
 
-def _fly_here(options: FlightOptions, stop: StopRequest, show: Callable[[dict[str, Any]], None]) -> Outcome:
+def _fly_here(
+    options: FlightOptions,
+    stop: StopRequest,
+    show: Callable[[dict[str, Any]], None],
+    say: Callable[[str], None],
+) -> Outcome:
     """Fly in this process; the outcome as two processes would leave it."""
     from sitl.flights.in_process import InProcessFlight, fly_in_process
 
@@ -171,7 +178,7 @@ def _fly_here(options: FlightOptions, stop: StopRequest, show: Callable[[dict[st
         ),
         stop,
         show,
-        lambda text: print(f"fly: {text}", file=sys.stderr, flush=True),
+        lambda text: say(f"fly: {text}"),
     )
     failure = ended.account.pop("failure")
     stopped = f"stopped by {stop.reason}" if stop else None
@@ -197,11 +204,10 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     clear(options.out)
     assert not isinstance(scenario.reference, GroundControl)  # see `sitl.flights.hold`
     path_from = scenario.reference.path
-    line = ProgressLine(sys.stderr)
     start = vehicle.initial_load_position
     reference: list[Any] = []  # made at the first progress event: it needs the autopilot's imports
 
-    def show(event: dict[str, Any]) -> None:
+    def status(event: dict[str, Any]) -> Status:
         import numpy as np
 
         from sitl.flights.metrics import reference_positions
@@ -210,17 +216,15 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
             reference.append(path_from(start))
         load = np.array(event["load_m"])
         target = reference_positions(reference[0], np.array([event["time_s"]]))[0]
-        x, y, z = event["load_m"]
-        line.show(
-            f"t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
-            f"error {np.linalg.norm(load - target):7.3f} m   {event['real_time_factor']:.2f} x real time"
-        )
+        event["mode"] = scenario.reference.kind
+        return status_of(event, float(np.linalg.norm(load - target)))
 
-    if options.in_process:
-        outcome = _fly_here(options, stop, show)
-    else:
-        outcome = watch(Pair(*options.command_lines()), stop, show)
-    line.end()
+    with Display() as display:
+        if options.in_process:
+            outcome = _fly_here(options, stop, lambda event: display.show(status(event)), display.say)
+        else:
+            pair = Pair(*options.command_lines(), display.messages)
+            outcome = watch(pair, stop, lambda event: display.show(status(event)))
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
     feedback = options.feedback or usual_feedback(scenario, vehicle)

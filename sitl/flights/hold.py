@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from sitl.flights.display import Display
 from sitl.flights.flight import FlightOptions
-from sitl.flights.launch import Pair, ProgressLine, watch
+from sitl.flights.launch import Pair, watch
 from sitl.flights.report import clear
+from sitl.flights.status import status_of
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import DescriptionError
 
@@ -41,15 +42,7 @@ def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     options.check_port()
     if options.out is not None:
         clear(options.out)
-    line = ProgressLine(sys.stderr)
-
-    def show(event: dict[str, Any]) -> None:
-        x, y, z = event["load_m"]
-        line.show(
-            f"t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
-            f"{event['real_time_factor']:.2f} x real time"
-        )
-
-    outcome = watch(Pair(*options.command_lines()), stop, show)
-    line.end()
+    with Display() as display:
+        pair = Pair(*options.command_lines(), display.messages)
+        outcome = watch(pair, stop, lambda event: display.show(status_of(event)))
     return None if stop else outcome.failure

@@ -25,8 +25,8 @@ from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH, columns, fill_row, kept_columns
 from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
-from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.physics.world import World
+from sitl_bridge.plant.run import progress_of
 from sitl_bridge.plant.sensing import Diverged
 from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.process import Speaker, StopRequest
@@ -223,12 +223,7 @@ def _controller_options(flight: InProcessFlight) -> ControllerOptions:
 
 
 def _progress(simulation: Simulation, began: list[float]) -> dict[str, Any]:
-    load = simulation.world.state[LOAD_POSITION].tolist()
-    return {
-        "time_s": simulation.scenario_time,
-        "load_m": load,
-        "real_time_factor": _factor(simulation, began) or 0.0,
-    }
+    return {**progress_of(simulation), "real_time_factor": _factor(simulation, began)}
 
 
 def _factor(simulation: Simulation, began: list[float]) -> float | None:

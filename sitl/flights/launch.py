@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import IO, Any
 
@@ -35,41 +35,15 @@ class Outcome:
     """What went wrong, in one line."""
     first_command_unix_s: float | None = None
     launch_to_first_command_s: float | None = None
-
-
-class ProgressLine:
-    """A line that is rewritten on a terminal, and repeated now and then in a file."""
-
-    FILE_INTERVAL = 5.0
-
-    def __init__(self, stream: IO[str]) -> None:
-        self._stream = stream
-        self._rewrites = stream.isatty()
-        self._next = 0.0
-        self._open = False
-
-    def show(self, text: str) -> None:
-        """Show the line as it is now."""
-        if self._rewrites:
-            self._stream.write(f"\r\x1b[K{text}")
-            self._open = True
-        elif time.monotonic() >= self._next:
-            self._next = time.monotonic() + self.FILE_INTERVAL
-            self._stream.write(f"{text}\n")
-        self._stream.flush()
-
-    def end(self) -> None:
-        """Leave the line as it stands."""
-        if self._open:
-            self._stream.write("\n")
-            self._stream.flush()
-        self._open = False
+    mode: str | None = None
+    """The last one that the controller told of, under ground control."""
 
 
 class Pair:
     """Plant and controller as child processes, which end when this process does."""
 
-    def __init__(self, plant: Sequence[str], controller: Sequence[str]) -> None:
+    def __init__(self, plant: Sequence[str], controller: Sequence[str], messages: int | None = None) -> None:
+        """messages: file descriptor for what they say to people; None: standard error."""
         self.launched_at = time.time()
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
         # The controller takes longer to start: it goes first. Each ends when its standard input does,
@@ -78,7 +52,8 @@ class Pair:
             self.processes[name] = subprocess.Popen(
                 [sys.executable, "-m", "sitl", name, *arguments, "--until-eof"],
                 stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE if name == "plant" else subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=messages,
             )
 
     def ended(self) -> str | None:
@@ -119,25 +94,30 @@ def how_it_ended(child: subprocess.Popen[bytes]) -> str:
     return f"ended with exit code {code}"
 
 
-def watch(pair: Pair, stop: StopRequest, show: Any) -> Outcome:
+def watch(pair: Pair, stop: StopRequest, show: Callable[[dict[str, Any]], None]) -> Outcome:
     """Wait for the flight's end, for a process to end before its time, or for a request to stop.
 
-    show(event): called with each progress event of the plant. Both processes are gone on return.
+    show(event): called with each progress event of the plant, which has the controller's `mode` too. Both
+    processes are gone on return.
     """
     outcome = Outcome()
-    plant = pair.processes["plant"]
-    assert plant.stdout is not None
-    os.set_blocking(plant.stdout.fileno(), False)
-    buffer = b""
+    events = {name: _Events(child) for name, child in pair.processes.items()}
+
+    def take() -> None:
+        for name in ("controller", "plant"):
+            for event in events[name].read():
+                _take(name, event, outcome, pair, show)
+
     with selectors.DefaultSelector() as selector:
-        selector.register(plant.stdout, selectors.EVENT_READ)
+        for name in events:
+            selector.register(events[name].stream, selectors.EVENT_READ)
         try:
             while not stop and not outcome.end:
                 if selector.select(POLL_INTERVAL):
-                    buffer = _events(plant.stdout, buffer, outcome, pair, show)
-                name = pair.ended()
-                if name is not None and not outcome.end:
-                    buffer = _events(plant.stdout, buffer, outcome, pair, show)
+                    take()
+                name = pair.ended() or ""
+                if name and not outcome.end:
+                    take()
                     if outcome.end:
                         break
                     others = "plant" if name == "controller" else "controller"
@@ -148,27 +128,45 @@ def watch(pair: Pair, stop: StopRequest, show: Any) -> Outcome:
                 pair.finish()
         finally:
             pair.stop()
-            _events(plant.stdout, buffer, outcome, pair, show)
+            take()
     if stop:
         outcome.failure = f"stopped by {stop.reason}"
     return outcome
 
 
-def _events(stream: IO[bytes], buffer: bytes, outcome: Outcome, pair: Pair, show: Any) -> bytes:
-    """Take in the plant's events; returns the beginning of one that is not complete."""
-    while data := stream.read(65536):
-        buffer += data
-    *lines, rest = buffer.split(b"\n")
-    for line in lines:
-        event = json.loads(line)
-        kind = event.pop("event")
-        if kind == "begin":
-            outcome.first_command_unix_s = event["unix_time_s"]
-            outcome.launch_to_first_command_s = event["unix_time_s"] - pair.launched_at
-        elif kind == "progress":
-            show(event)
-        elif kind == "end":
-            if failure := event.pop("failure"):
-                outcome.failure = f"the plant gave up: {failure}"
-            outcome.end = event
-    return rest
+class _Events:
+    """The events on a process' standard output."""
+
+    def __init__(self, child: subprocess.Popen[bytes]) -> None:
+        assert child.stdout is not None
+        self.stream: IO[bytes] = child.stdout
+        self._rest = b""
+        os.set_blocking(self.stream.fileno(), False)
+
+    def read(self) -> list[dict[str, Any]]:
+        """Those that are complete by now."""
+        while data := self.stream.read(65536):
+            self._rest += data
+        *lines, self._rest = self._rest.split(b"\n")
+        return [json.loads(line) for line in lines]
+
+
+def _take(
+    name: str,
+    event: dict[str, Any],
+    outcome: Outcome,
+    pair: Pair,
+    show: Callable[[dict[str, Any]], None],
+) -> None:
+    kind = event.pop("event")
+    if kind == "mode":
+        outcome.mode = event["mode"]
+    elif kind == "begin":
+        outcome.first_command_unix_s = event["unix_time_s"]
+        outcome.launch_to_first_command_s = event["unix_time_s"] - pair.launched_at
+    elif kind == "progress":
+        show({**event, "mode": outcome.mode})
+    elif kind == "end" and name == "plant":
+        if failure := event.pop("failure"):
+            outcome.failure = f"the plant gave up: {failure}"
+        outcome.end = event

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Sequence
@@ -10,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from controller.over.stack import read_stack
+from sitl.flights.display import Display
 from sitl.flights.flight import new_folder
 from sitl.flights.free_ports import free_ports
 from sitl.flights.keep import keep_recording
-from sitl.flights.launch import ProgressLine
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import OF_THE_PLANT, clear, positions, read_state_log, write_report
+from sitl.flights.report import OF_THE_PLANT, clear, positions, read_state_log, row, write_report
 from sitl.flights.scenario import GroundControl, Scenario, scenario_vehicle, suited
+from sitl.flights.status import Status, status_of
 from sitl.over.processes import Account, Children
 from sitl.over.window import cut_log, step_figures
 from sitl_bridge.mavlink.links import Address, open_link
@@ -130,27 +132,19 @@ def fly_over(options: OverFlight, stop: StopRequest) -> tuple[dict[str, Any], Pa
     clear(out)
     [truth_port] = free_ports(1)
     account = Account()
-    line = ProgressLine(sys.stderr)
-    Children(*options.command_lines(out, truth_port)).watch(
-        account, stop, lambda event: line.show(progress_text(event))
-    )
-    line.end()
+    with Display() as display:
+        children = Children(*options.command_lines(out, truth_port), display.messages)
+        children.watch(account, stop, lambda event: display.show(status(event)))
     if account.failure:
         print(f"fly: {account.failure}", file=sys.stderr, flush=True)
     return report(options, out, account), out
 
 
-def progress_text(event: dict[str, Any]) -> str:
-    """The progress line."""
-    if event["time_s"] is None:
-        return str(event["doing"])
+def status(event: dict[str, Any]) -> Status:
+    """How the flight goes, from a progress event of the companion."""
     load, reference = event["load_m"], event["reference_m"]
-    x, y, z = load
-    error = sum((a - b) ** 2 for a, b in zip(load, reference, strict=True)) ** 0.5
-    return (
-        f"{event['doing']}: t {event['time_s']:6.2f} s   load [{x:6.2f} {y:6.2f} {z:6.2f}] m   "
-        f"off its motion by {error:6.3f} m"
-    )
+    error = None if load is None else math.dist(load, reference)
+    return status_of({**event, "mode": event["doing"]}, error)
 
 
 def report(options: OverFlight, out: Path, account: Account) -> dict[str, Any]:
@@ -215,8 +209,8 @@ def _figures(log: dict[str, Any], path: Any) -> dict[str, Any]:
     )
 
 
-def table(summary: dict[str, Any]) -> str:
-    """The lines at the end of a flight that a step over a stack adds."""
+def table(summary: dict[str, Any], width: int = 1000) -> str:
+    """The lines at the end of a flight that a step over a stack adds; width: of the terminal, in columns."""
     over = summary["over"]
     rows = [
         ("within 10 % / 5 %", _pair(over.get("within_10pct_s"), over.get("within_5pct_s"), "s")),
@@ -225,7 +219,7 @@ def table(summary: dict[str, Any]) -> str:
         ("residual swing, rms", _one(over.get("residual_swing_rms_deg"), "°", 2)),
         ("residual error, rms", _one(over.get("residual_error_rms_m"), "m", 3)),
     ]
-    return "\n".join(f"  {name:<26}{value}" for name, value in rows if value)
+    return "\n".join(row(name, value, width) for name, value in rows if value)
 
 
 def _one(value: float | None, unit: str, digits: int) -> str:

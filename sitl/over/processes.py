@@ -43,7 +43,8 @@ class Account:
 class Children:
     """The two processes; each ends when its standard input does."""
 
-    def __init__(self, plant: Sequence[str], companion: Sequence[str]) -> None:
+    def __init__(self, plant: Sequence[str], companion: Sequence[str], messages: int | None = None) -> None:
+        """messages: file descriptor for what they say to people; None: standard error."""
         self._children: dict[str, subprocess.Popen[bytes]] = {}
         self._buffers = {"plant": b"", "companion": b""}
         for name, arguments in (("companion", companion), ("plant", plant)):
@@ -51,6 +52,7 @@ class Children:
                 [sys.executable, "-m", "sitl", *arguments, "--until-eof"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
+                stderr=messages,
             )
             os.set_blocking(_pipe(child).fileno(), False)
             self._children[name] = child

@@ -12,19 +12,45 @@ FAR = 5000.0
 """m from where the vehicle started, beyond which nobody flies a scenario."""
 TUMBLING = 5.0
 """rad/s, of roll and pitch: tilted and turning so fast, a vehicle is between two looks at it upside down."""
+CRASHED_BELOW = 0.5
+"""Cosine of the tilt, 60 degrees: a vehicle that touches the ground more tilted has crashed."""
 GRACE = 3.0
 """s that a flight goes on after its vehicle is lost: what happened is in the log."""
 LOOK_INTERVAL = 0.1
 """s between two looks."""
 
 
+def condition(vehicle: Vehicle, x: Array, cable_holds: bool) -> str | None:
+    """What happened to the vehicle of state x (19,), in words; None: it stands or flies with its load."""
+    up = upright(x)
+    height = math.inf if vehicle.ground is None else x[VEHICLE_POSITION][2] - vehicle.ground.height
+    if height < _reach(vehicle) and (up < CRASHED_BELOW or is_lost(vehicle, x)):
+        return "crashed"
+    if up < 0.0:
+        return "upside down"
+    if not cable_holds:
+        return "load lost"
+    return "out of control" if is_lost(vehicle, x) else None
+
+
+def upright(x: Array) -> float:
+    """Cosine of the angle between the vehicle's up axis and the world's."""
+    w, qx, qy, qz = x[ATTITUDE].tolist()
+    return float(rotate((w, qx, qy, qz), (0.0, 0.0, 1.0))[2])
+
+
+def _reach(vehicle: Vehicle) -> float:
+    """Height of the centre, m, below which some part of a vehicle may touch the ground."""
+    legs = max((math.hypot(*leg) for leg in vehicle.airframe.legs), default=0.0)
+    return max(legs, *(math.hypot(*rotor.position) for rotor in vehicle.rotors))
+
+
 def is_lost(vehicle: Vehicle, x: Array) -> bool:
     """Whether the vehicle of state x (19,) does not come back by itself."""
-    w, qx, qy, qz = x[ATTITUDE].tolist()
-    upright = rotate((w, qx, qy, qz), (0.0, 0.0, 1.0))[2]
+    up = upright(x)
     roll_rate, pitch_rate, _ = x[BODY_RATES].tolist()
-    tumbles = math.hypot(roll_rate, pitch_rate) > TUMBLING and upright < 0.7
-    if upright < 0.0 or tumbles:
+    tumbles = math.hypot(roll_rate, pitch_rate) > TUMBLING and up < 0.7
+    if up < 0.0 or tumbles:
         return True
     east, north, up = x[VEHICLE_POSITION].tolist()
     start = vehicle.initial_vehicle_position

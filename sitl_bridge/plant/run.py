@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.lossy_link import LossyLink
@@ -21,6 +21,7 @@ from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.account import Account
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
+from sitl_bridge.plant.lost_vehicle import condition
 from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.sensing import Diverged
 from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
@@ -57,6 +58,17 @@ class PlantOptions:
     """Viewers and companions that are shown the true state of vehicle and load."""
 
 
+def progress_of(simulation: Simulation) -> dict[str, Any]:
+    """How a scenario goes: fields of a progress event."""
+    world = simulation.world
+    return {
+        "time_s": simulation.scenario_time,
+        "load_m": world.state[LOAD_POSITION].tolist(),
+        "tension_N": world.cable_tension(),
+        "condition": condition(world.vehicle, world.state, world.cable_holds),
+    }
+
+
 class Progress:
     """When the scenario began and how it goes, in wall time."""
 
@@ -77,10 +89,7 @@ class Progress:
         self.due = now + REPORT_INTERVAL
         if self.began_at is None:
             return
-        load = simulation.world.state[LOAD_POSITION].tolist()
-        self._speaker.event(
-            "progress", time_s=simulation.scenario_time, load_m=load, real_time_factor=self.factor(simulation)
-        )
+        self._speaker.event("progress", **progress_of(simulation), real_time_factor=self.factor(simulation))
 
     def factor(self, simulation: Simulation) -> float | None:
         """Simulated seconds a second, since the scenario began."""

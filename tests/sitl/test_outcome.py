@@ -13,6 +13,7 @@ import pytest
 import sitl
 from sitl.flights.free_ports import free_ports
 from sitl.flights.outcome import FELL, judge
+from sitl.flights.report import IN_WORDS
 from sitl_bridge.plant.lost_vehicle import GRACE
 from sitl_bridge.vehicle.files import load_vehicle
 
@@ -92,7 +93,7 @@ def test_a_vehicle_that_is_lost_is_named_and_the_flight_ends_soon_after(tmp_path
     command += ["--out", str(tmp_path / "out")]
     said = subprocess.run(command, capture_output=True, text=True, check=False)
     assert said.returncode == 1
-    assert f"{flight.summary['outcome'].upper()} at t = {lost_at:.2f} s" in said.stdout
+    assert f"{IN_WORDS[flight.summary['outcome']]} at t = {lost_at:.2f} s" in said.stdout
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["outcome"] == flight.summary["outcome"]
 

@@ -17,6 +17,7 @@ from sitl_bridge.plant.physics.battery import (
     power_coefficients,
     reading,
 )
+from sitl_bridge.plant.physics.cable import tension_of
 from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.physics.dynamics import advance, set_rotors
 from sitl_bridge.plant.physics.parameters import parameters, step_count
@@ -188,6 +189,15 @@ class World:
     def release_cable(self) -> None:
         """Join vehicle and load no more."""
         self.inner[CABLE_HOLDS] = 0.0
+
+    @property
+    def cable_holds(self) -> bool:
+        """Whether the cable joins vehicle and load."""
+        return bool(self.inner[CABLE_HOLDS])
+
+    def cable_tension(self) -> float:
+        """The cable's tension, N."""
+        return tension_of(self._parameters.view(np.recarray)[0], self.state, self.inner)
 
     def set_load_mass(self, mass: float | None) -> None:
         """Change the load's mass, kg; None: as described."""
