@@ -12,7 +12,8 @@ import numpy as np
 
 from controller.design.ramp import LARGEST_THRUST, STEEPEST, Demand, demand_of_circle, planned
 from controller.law.reference import Path, circle
-from sitl_bridge.vehicle.description import Rotor, Vehicle, hover_rotor_speeds, rotor_effect
+from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
+from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
 
 LEAST_THRUST = 1.05
 """Of what hovering takes, of each rotor: with less, `heavy` could not be steered on noisy sensors."""
@@ -27,7 +28,7 @@ LONGEST_ENTRY = 60.0
 
 def vehicle_faults(vehicle: Vehicle) -> list[str]:
     """Why no law flies this vehicle; empty: there is no reason."""
-    return [*_thrust(vehicle), *_rotors_too_slow(vehicle), *_start(vehicle)]
+    return [*_thrust(vehicle), *_rotors_too_slow(vehicle)]
 
 
 def path_faults(path: Path, vehicle: Vehicle, feasible: bool = True) -> list[str]:
@@ -74,19 +75,6 @@ def _rotors_too_slow(vehicle: Vehicle) -> list[str]:
         ]
     would_do = _largest(lambda x: _righting_time(vehicle, axis, x) <= LONGEST_RIGHTING, lag)
     return [f"rotors.*.time_constant = {lag:g} s: {said}; expected up to {_short(would_do)} s"]
-
-
-def _start(vehicle: Vehicle) -> list[str]:
-    """The cable pulls the vehicle down harder at the start than all rotors push it up."""
-    cable, length = vehicle.cable, vehicle.initial_length
-    tension = cable.stiffness * (length - cable.rest_length)
-    full = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
-    if tension <= full:
-        return []
-    return [
-        f"initial.vehicle_position: {length:.4g} m from the load, where the cable pulls with {tension:.4g} N "
-        f"and the rotors give {full:.4g} N; expected up to {cable.rest_length + full / cable.stiffness:.4g} m"
-    ]
 
 
 def _righting_time(vehicle: Vehicle, axis: int, lag: float, inertia: float | None = None) -> float:

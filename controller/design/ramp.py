@@ -14,7 +14,8 @@ import numpy as np
 
 from controller.law.reference import SMOOTH_STEP, Path
 from controller.law.state import Array
-from sitl_bridge.vehicle.description import Drag, Vehicle, rotor_effect
+from sitl_bridge.vehicle.description import Drag, Vehicle
+from sitl_bridge.vehicle.rotors import rotor_effect
 
 LARGEST_TILT = math.radians(25.0)
 """Of the vehicle along the ramp, rad."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from controller.law.state import WRENCH_SIZE, Array
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import ACTUATOR_CONTROLS
-from sitl_bridge.vehicle.description import Vehicle, rotor_effect
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.rotors import rotor_effect
 
 MOST_ROTORS = ACTUATOR_CONTROLS
 

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import Override, load_vehicle, read_toml, shipped, validated
+from sitl_bridge.vehicle.files import Override, beside, is_path, load_vehicle, read_toml, shipped, validated
 from sitl_bridge.vehicle.schema import Section, Vector, quantity
 
 if TYPE_CHECKING:
@@ -88,9 +88,24 @@ def scenario_names() -> list[str]:
 
 
 def load_scenario(name_or_file: str) -> Scenario:
-    """Load a scenario by shipped name or path; raises DescriptionError with a line for each fault."""
+    """Load a scenario by shipped name or path; raises DescriptionError with a line for each fault.
+
+    Paths in it, of its vehicle and of presets that it sets, are relative to its own file.
+    """
     source, content = read_toml(name_or_file, _folder(), "scenario")
-    return validated(Scenario, content, source)
+    scenario = validated(Scenario, content, source)
+    beside_it = {key: tuple(_preset_beside(text, source) for text in getattr(scenario, key)) for key in SETS}
+    return scenario.model_copy(update={"vehicle": beside(scenario.vehicle, source), **beside_it})
+
+
+SETS = ("set", "plant_set")
+"""Keys of a scenario that are lists of overrides."""
+
+
+def _preset_beside(text: str, source: str) -> str:
+    key, _, value = text.partition("=")
+    name = value.strip().strip("\"'")
+    return f"{key}={beside(name, source)}" if key.strip() == "sensors.preset" and is_path(name) else text
 
 
 OF_THE_VEHICLE = ("airframe.", "rotors.", "cable.", "load.", "initial.vehicle_position")

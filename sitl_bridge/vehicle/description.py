@@ -7,19 +7,26 @@ the world is ENU with z up, the body FLU; angles are in radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from sitl_bridge.ids import ACTUATOR_CONTROLS
-from sitl_bridge.vehicle.schema import Section, Vector, quantity
+from sitl_bridge.vehicle.physics import PhysicsError, physics_faults
+from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
+from sitl_bridge.vehicle.schema import (
+    Angles,
+    Arm,
+    Inertia,
+    Place,
+    Rates,
+    Section,
+    Vector,
+    Velocity,
+    quantity,
+)
 from sitl_bridge.vehicle.sensors import Sensors
-
-SMALLEST_SHARE = 1e-6
-"""Of a rotor in the thrust without moments, against that of rotors that share it evenly."""
 
 
 class Drag(Section):
@@ -31,44 +38,11 @@ class Drag(Section):
 
 class Airframe(Section):
     mass: float = quantity("kg", "m_v, of the vehicle without load", gt=0, le=1e4)
-    inertia: Annotated[
-        tuple[
-            Annotated[float, Field(gt=0, le=1e5)],
-            Annotated[float, Field(gt=0, le=1e5)],
-            Annotated[float, Field(gt=0, le=1e5)],
-        ],
-        Field(description="principal moments of inertia, body axes", json_schema_extra={"unit": "kg m²"}),
-    ]
+    inertia: Inertia = quantity("kg m²", "principal moments of inertia, body axes")
     drag: Drag = Drag()
-    legs: tuple[Vector, ...] = quantity(
+    legs: tuple[Arm, ...] = quantity(
         "m", "points that touch the ground, body FLU, from the centre of mass", (), max_length=8
     )
-
-
-class Rotor(Section):
-    position: Vector = quantity("m", "of the hub, body FLU, from the centre of mass")
-    direction: Literal["cw", "ccw"] = quantity("-", "seen from above; ccw gives a reaction torque about -z")
-    thrust_coefficient: float = quantity("N s²/rad²", "c_T of eq. 5", gt=0)
-    torque_coefficient: float = quantity("N m s²/rad²", "c_Q of eq. 12", ge=0)
-    max_speed: float = quantity("rad/s", "largest speed, at control 1", gt=0, le=1e5)
-    diameter: float | None = quantity(
-        "m",
-        "of the disc: the battery's drain is momentum theory's; without one, that of c_Q",
-        None,
-        gt=0,
-        le=20,
-    )
-    time_constant: float = quantity("s", "of the speed's first-order lag; 0: no lag", 0.0, ge=0, le=10)
-
-
-def rotor_effect(rotors: Sequence[Rotor]) -> NDArray[np.float64]:
-    """Thrust and moments about x, y, z (N and N m, body FLU) of a newton of each rotor: (4, n), eq. 13."""
-    columns = []
-    for rotor in rotors:
-        x, y, _ = rotor.position
-        sign = -1.0 if rotor.direction == "ccw" else 1.0
-        columns.append((1.0, y, -x, sign * rotor.torque_coefficient / rotor.thrust_coefficient))
-    return np.array(columns).T
 
 
 class Cable(Section):
@@ -80,7 +54,9 @@ class Cable(Section):
         "two-way also pushes below its rest length (the paper's); tension-only never does",
         "tension-only",
     )
-    breaking_tension: float | None = quantity("N", "more than this, and the cable breaks", None, gt=0)
+    breaking_tension: float | None = quantity(
+        "N", "more than this, and the cable breaks", None, gt=0, le=1e12
+    )
 
 
 class Load(Section):
@@ -93,8 +69,8 @@ class Ground(Section):
     """Level ground: compliant, with friction. Its stiffness follows from how far it yields to a resting
     body."""
 
-    height: float = quantity("m", "world z of the surface", 0.0)
-    sink: float = quantity("m", "how far a body at rest sinks in", 0.003, gt=0, le=0.1)
+    height: float = quantity("m", "world z of the surface", 0.0, ge=-1e5, le=1e5)
+    sink: float = quantity("m", "how far a body at rest sinks in", 0.003, ge=1e-5, le=0.1)
     damping_ratio: float = quantity("-", "of a resting body's bounce", 0.7, ge=0, le=2)
     friction: float = quantity("-", "coefficient of friction under the legs", 0.6, ge=0, le=5)
     load_friction: float = quantity("-", "coefficient of friction under the load", 0.5, ge=0, le=5)
@@ -105,20 +81,20 @@ class Turbulence(Section):
 
     wind_at_6_m: float = quantity("m/s", "W_20: light 7.7, moderate 15.4, severe 23.1", gt=0, le=60)
     height: float = quantity("m", "height above ground that sets scale and intensity", 10.0, ge=3, le=300)
-    airspeed: float = quantity("m/s", "V: how fast the frozen field drifts past", 5.0, gt=0, le=100)
+    airspeed: float = quantity("m/s", "V: how fast the frozen field drifts past", 5.0, ge=0.01, le=100)
 
 
 class Gust(Section):
     """One 1-cosine gust: from nothing to the peak and back."""
 
-    start: float = quantity("s", "from the start of the scenario", ge=0)
-    duration: float = quantity("s", "from nothing to nothing", gt=0, le=1e3)
-    peak: Vector = quantity("m/s", "air velocity at its height, world ENU, on top of the wind")
+    start: float = quantity("s", "from the start of the scenario", ge=0, le=1e7)
+    duration: float = quantity("s", "from nothing to nothing", ge=1e-3, le=1e3)
+    peak: Velocity = quantity("m/s", "air velocity at its height, world ENU, on top of the wind")
     acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that it meets", "both")
 
 
 class Air(Section):
-    wind: Vector = quantity("m/s", "steady air velocity, world ENU", (0.0, 0.0, 0.0))
+    wind: Velocity = quantity("m/s", "steady air velocity, world ENU", (0.0, 0.0, 0.0))
     turbulence: Turbulence | None = None
     gusts: tuple[Gust, ...] = ()
 
@@ -127,7 +103,7 @@ class Battery(Section):
     """A pack of lithium cells: voltage falls with the charge drawn and with the current."""
 
     cells: int = quantity("-", "in series", ge=1, le=100)
-    capacity: float = quantity("A h", "charge of the full pack", gt=0, le=1e4)
+    capacity: float = quantity("A h", "charge of the full pack", ge=1e-3, le=1e4)
     resistance: float = quantity("ohm", "of the whole pack", ge=0, le=10)
     full_cell_voltage: float = quantity("V", "open circuit, full", 4.2, gt=0, le=10)
     empty_cell_voltage: float = quantity("V", "open circuit, empty", 3.5, gt=0, le=10)
@@ -155,17 +131,17 @@ class Initial(Section):
     start: Literal["hover", "ground"] = quantity(
         "-", "in the air, or on the legs with a slack cable", "hover"
     )
-    load_position: Vector = quantity("m", "world ENU", (0.0, 0.0, 0.0))
-    vehicle_position: Vector | None = quantity("m", "world ENU", None)
-    load_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
-    vehicle_velocity: Vector = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
-    attitude: Vector = quantity("rad", "roll, pitch, yaw (about X, Y, Z; R = Rz Ry Rx)", (0.0, 0.0, 0.0))
-    body_rates: Vector = quantity("rad/s", "p, q, r, body FLU", (0.0, 0.0, 0.0))
+    load_position: Place = quantity("m", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_position: Place | None = quantity("m", "world ENU", None)
+    load_velocity: Velocity = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    vehicle_velocity: Velocity = quantity("m/s", "world ENU", (0.0, 0.0, 0.0))
+    attitude: Angles = quantity("rad", "roll, pitch, yaw (about X, Y, Z; R = Rz Ry Rx)", (0.0, 0.0, 0.0))
+    body_rates: Rates = quantity("rad/s", "p, q, r, body FLU", (0.0, 0.0, 0.0))
 
 
 class Disturbance(Section):
     force_std: float = quantity("N", "standard deviation on each axis of a white force", 0.0, ge=0, le=1e4)
-    hold_time: float = quantity("s", "each draw of the white force is held so long", 0.01, gt=0, le=10)
+    hold_time: float = quantity("s", "each draw of the white force is held so long", 0.01, ge=1e-4, le=10)
     acts_on: Literal["both", "vehicle", "load"] = quantity("-", "bodies that the white force acts on", "both")
 
 
@@ -195,7 +171,7 @@ class Vehicle(Section):
 
     name: str = quantity("-", "short name", min_length=1)
     description: str = quantity("-", "one line, with where the figures come from", "")
-    gravity: float = quantity("m/s²", "g", 9.81, gt=0, le=30)
+    gravity: float = quantity("m/s²", "g", 9.81, ge=0.1, le=30)
     airframe: Airframe
     rotors: tuple[Rotor, ...] = quantity(
         "-", "in the order of the actuator controls", min_length=4, max_length=ACTUATOR_CONTROLS
@@ -213,51 +189,9 @@ class Vehicle(Section):
     home: Home = Home()
 
     @model_validator(mode="after")
-    def _can_hover(self) -> Vehicle:
-        available = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in self.rotors)
-        if available <= self.hover_thrust:
-            raise ValueError(
-                f"rotors give {available:.4g} N at full speed, hovering takes {self.hover_thrust:.4g} N"
-            )
-        if self.initial.vehicle_position == self.initial.load_position:
-            raise ValueError("initial.vehicle_position equals initial.load_position: no cable direction")
-        return self
-
-    @model_validator(mode="after")
-    def _can_steer(self) -> Vehicle:
-        effect = rotor_effect(self.rotors)
-        if np.linalg.matrix_rank(effect) < len(effect):
-            raise ValueError(
-                "rotors: they cannot give thrust and all three moments independently; "
-                "expected hubs on all sides, some cw and some ccw, with torque_coefficient > 0"
-            )
-        share = np.linalg.pinv(effect)[:, 0]
-        idle = [str(i) for i in np.flatnonzero(share <= SMALLEST_SHARE / len(share))]
-        if idle:
-            raise ValueError(
-                f"rotors: thrust without moments leaves nothing to {', '.join(idle)}; "
-                "expected hubs on all sides, and as much cw as ccw"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _can_stand(self) -> Vehicle:
-        if self.ground is not None and len(self.airframe.legs) < 3:
-            raise ValueError("airframe.legs: on ground a vehicle needs three or more; expected points in m")
-        if self.ground is None and self.initial.start == "ground":
-            raise ValueError("initial.start = 'ground': there is no [ground] table")
-        if self.ground is not None and self.initial.start == "hover":
-            bodies = (self.initial.load_position, self.initial.vehicle_position or self.initial.load_position)
-            depth = self.ground.height - min(position[2] for position in bodies)
-            if depth > 0.0:
-                raise ValueError(
-                    f"initial: hovering begins {depth:.4g} m below ground.height; expected above"
-                )
-        if self.initial.start == "ground" and self.initial_length > self.cable.rest_length:
-            raise ValueError(
-                f"initial: the load lies {self.initial_length:.4g} m from the vehicle, "
-                f"further than cable.rest_length = {self.cable.rest_length:.4g} m"
-            )
+    def _is_possible(self) -> Vehicle:
+        if faults := physics_faults(self, type(self).model_fields):
+            raise PhysicsError(faults)
         return self
 
     @property

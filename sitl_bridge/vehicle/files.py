@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.errors import fault_line
+from sitl_bridge.vehicle.errors import DescriptionError, Location, did_you_mean, fault_lines
+from sitl_bridge.vehicle.overrides import Override, apply_overrides
+from sitl_bridge.vehicle.physics import PhysicsFault, physics_faults
 from sitl_bridge.vehicle.schema import Section
+from sitl_bridge.vehicle.toml_lines import line_of
 
+__all__ = [
+    "DescriptionError",
+    "Override",
+    "beside",
+    "is_path",
+    "load_vehicle",
+    "preset_names",
+    "read_toml",
+    "shipped",
+    "validated",
+    "vehicle_names",
+]
 Model = TypeVar("Model", bound=Section)
-
-
-class DescriptionError(ValueError):
-    """A faulty description; `faults` has one line for each fault."""
-
-    def __init__(self, source: str, faults: list[str]) -> None:
-        self.source = source
-        self.faults = faults
-        super().__init__("\n".join(f"{source}: {fault}" for fault in faults))
-
-
-class Override(NamedTuple):
-    """One value of a description to change, `KEY=VALUE`, and where a person has said so."""
-
-    text: str
-    source: str = "--set"
+Origin = Callable[[Location], str]
+"""Where a value comes from, for the end of a message: a line of its file, or a flag; empty: unknown."""
 
 
 def shipped(folder: Any) -> list[str]:
@@ -48,23 +49,40 @@ def preset_names() -> list[str]:
     return shipped(resources.files("sitl_bridge") / "presets")
 
 
+def is_path(name_or_file: str) -> bool:
+    """Whether a file is meant, and not the name of a shipped one."""
+    return name_or_file.endswith(".toml") or "/" in name_or_file
+
+
+def beside(name_or_file: str, source: str) -> str:
+    """A name or path as a file says it, from where the program runs: paths are relative to that file."""
+    if is_path(name_or_file) and is_path(source):
+        return str(Path(source).parent / name_or_file)
+    return name_or_file
+
+
 def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str, Any]]:
     """Read a shipped TOML file by name, or any by path; returns (source for messages, content).
 
     Raises DescriptionError when there is no such file or it is not TOML.
     """
-    is_path = name_or_file.endswith(".toml") or "/" in name_or_file
-    entry = Path(name_or_file) if is_path else folder / f"{name_or_file}.toml"
+    entry = Path(name_or_file) if is_path(name_or_file) else folder / f"{name_or_file}.toml"
     try:
         text = entry.read_text(encoding="utf-8")
         return name_or_file, tomllib.loads(text)
     except FileNotFoundError:
-        known = ", ".join(shipped(folder))
+        known = shipped(folder)
         raise DescriptionError(
-            name_or_file, [f"no such {kind}; expected one of {known}, or the path of a .toml file"]
+            name_or_file,
+            [
+                f"no such {kind}; expected one of {', '.join(known)}, or the path of a .toml file"
+                f"{did_you_mean(name_or_file, known)}"
+            ],
         ) from None
     except tomllib.TOMLDecodeError as error:
         raise DescriptionError(name_or_file, [f"not valid TOML: {error}"]) from None
+    except RecursionError:
+        raise DescriptionError(name_or_file, ["not valid TOML: nested too deeply"]) from None
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or no possible path
         raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
 
@@ -76,27 +94,31 @@ def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = (
     fault.
     """
     if isinstance(vehicle, Vehicle):
-        source, content = vehicle.name, vehicle.model_dump(exclude_none=True)
+        source, content = vehicle.name, vehicle.model_dump(mode="json", exclude_none=True)
     else:
         source, content = read_toml(vehicle, resources.files("sitl_bridge") / "vehicles", "vehicle")
-    for override in overrides:
-        apply_override(content, override if isinstance(override, Override) else Override(override))
+    changes = [o if isinstance(o, Override) else Override(o) for o in overrides]
+    apply_overrides(content, changes)
     if isinstance(sensors := content.get("sensors"), dict):
-        content["sensors"] = _on_preset(sensors)
-    return validated(Vehicle, content, source)
+        said_by = _origin("", changes)(("sensors", "preset"))
+        content["sensors"] = _on_preset(sensors, "" if said_by else source)
+    return validated(Vehicle, content, source, _origin(source, changes))
 
 
-def _on_preset(sensors: dict[str, Any]) -> dict[str, Any]:
-    """The sensors' table on top of the preset that it names, and that on top of its own."""
+def _on_preset(sensors: dict[str, Any], source: str) -> dict[str, Any]:
+    """The sensors' table on top of the preset that it names, and that on top of its own.
+
+    source: the file that names the preset.
+    """
     names: list[str] = []
     complete = sensors
     below = sensors
     while "preset" in below:
-        name = str(below["preset"])
+        name = beside(str(below["preset"]), source)
         if name in names:
             raise DescriptionError(name, [f"preset: stands on itself ({' on '.join([*names, name])})"])
         names.append(name)
-        _, below = read_toml(name, resources.files("sitl_bridge") / "presets", "preset")
+        source, below = read_toml(name, resources.files("sitl_bridge") / "presets", "preset")
         complete = _merged(below, complete)
     return complete
 
@@ -110,43 +132,53 @@ def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
-def apply_override(content: dict[str, Any], override: Override) -> None:
-    """Set one value of nested tables from `table.key=VALUE`, VALUE being TOML or a bare word."""
-    key, equals, text = override.text.partition("=")
-    path, source = key.strip().split("."), override.source
-    if not equals or not all(path):
-        raise DescriptionError(source, [f"{override.text!r}: expected KEY=VALUE, as in cable.rest_length=10"])
-    try:
-        parsed = tomllib.loads(f"value = {text.strip()}")
-    except ValueError:
-        parsed = {}
-    # A bare word is no TOML; more than one value (on lines of their own) is no value either.
-    value: Any = parsed["value"] if parsed.keys() == {"value"} else text.strip()
-    target: Any = content
-    for step, following in zip(path, [*path[1:], None], strict=True):
-        place: Any = step
-        if isinstance(target, list):
-            if not step.isdecimal() or int(step) >= len(target):
-                raise DescriptionError(source, [f"{key}: {step!r} is no index of a list of {len(target)}"])
-            place = int(step)
-        elif not isinstance(target, dict):
-            raise DescriptionError(source, [f"{key}: {step!r} lies below a value that is not a table"])
-        if following is None:
-            target[place] = value
-        else:
-            target = target[place] if isinstance(target, list) else target.setdefault(place, {})
+def _origin(source: str, overrides: Sequence[Override]) -> Origin:
+    """Of the values of a file that overrides have changed."""
+
+    def origin(location: Location) -> str:
+        for override in reversed(overrides):
+            if all(a == b for a, b in zip(override.keys, location, strict=False)):
+                return override.source
+        if not is_path(source) or not location:
+            return ""
+        try:
+            line = line_of(Path(source).read_text(encoding="utf-8"), location)
+        except (OSError, ValueError):  # it was there a moment ago
+            return ""
+        return "" if line is None else f"line {line}"
+
+    return origin
 
 
-def validated(model: type[Model], content: Mapping[str, Any], source: str) -> Model:
+def validated(
+    model: type[Model], content: Mapping[str, Any], source: str, origin: Origin | None = None
+) -> Model:
     """Validate a parsed file against its model; raises DescriptionError with a line for each fault."""
+    complete = _tuples(content)
     try:
-        return model.model_validate(_tuples(content))
+        return model.model_validate(complete)
     except ValidationError as error:
-        faults = error.errors()
-        # A list that seems short only because one of its entries is at fault is no fault of its own.
-        followed = {fault["loc"][:1] for fault in faults if len(fault["loc"]) > 1}
-        own = [f for f in faults if not (f["type"] == "too_short" and f["loc"] in followed)]
-        raise DescriptionError(source, [fault_line(model, fault) for fault in own]) from None
+        faults = fault_lines(model, error.errors())
+    if model is Vehicle:
+        faults += _of_sound_tables(complete, {str(fault.location[0]) for fault in faults if fault.location})
+    said: dict[str, None] = {}
+    for fault in faults:
+        place = (origin or _origin(source, ()))(fault.location)
+        said[f"{fault.text} ({place})" if place else fault.text] = None
+    raise DescriptionError(source, said)
+
+
+def _of_sound_tables(content: Mapping[str, Any], faulty: set[str]) -> list[PhysicsFault]:
+    """Faults of physics in the tables of a faulty description that are valid by themselves."""
+    fields = Vehicle.model_fields
+    kinds: dict[str, Any] = {name: field.annotation for name, field in fields.items()}
+    sound = {
+        name: TypeAdapter(kind).validate_python(content[name])
+        for name, kind in kinds.items()
+        if name in content and name not in faulty
+    }
+    defaults = {name for name, field in fields.items() if not field.is_required()}
+    return physics_faults(Vehicle.model_construct(**sound), (defaults - faulty) | sound.keys())
 
 
 def _tuples(value: Any) -> Any:

@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Vector = tuple[float, float, float]
+
+_Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
+_ArmLength = Annotated[float, Field(ge=-100, le=100)]
+_Speed = Annotated[float, Field(ge=-1e3, le=1e3)]
+_Angle = Annotated[float, Field(ge=-100, le=100)]
+_Rate = Annotated[float, Field(ge=-1e3, le=1e3)]
+_Inertia = Annotated[float, Field(gt=0, le=1e5)]
+
+Place = tuple[_Metres, _Metres, _Metres]
+"""m, world ENU."""
+Arm = tuple[_ArmLength, _ArmLength, _ArmLength]
+"""m, from the centre of mass, body FLU."""
+Velocity = tuple[_Speed, _Speed, _Speed]
+"""m/s."""
+Angles = tuple[_Angle, _Angle, _Angle]
+"""rad."""
+Rates = tuple[_Rate, _Rate, _Rate]
+"""rad/s."""
+Inertia = tuple[_Inertia, _Inertia, _Inertia]
+"""kg m²."""
 
 
 def quantity(unit: str, description: str, default: Any = ..., **bounds: Any) -> Any:

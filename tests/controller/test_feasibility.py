@@ -73,13 +73,6 @@ def test_an_inertia_that_the_rotors_do_not_move() -> None:
     assert fault.startswith("airframe.inertia.0 = 5 kg m²")
 
 
-def test_a_start_that_the_cable_does_not_allow() -> None:
-    vehicle = load_vehicle("iris", ["initial.start=hover", "initial.vehicle_position=[0, 0, 30]"])
-    (fault,) = vehicle_faults(vehicle)
-    allowed = float(re.search(r"expected up to ([0-9.]+) m", fault)[1])  # type: ignore[index]
-    assert vehicle.cable.rest_length < allowed < 29.0
-
-
 def test_a_setpoint_in_the_ground() -> None:
     vehicle = load_vehicle("iris")
     (fault,) = path_faults(setpoint((1.0, 0.0, -1.0), HIGH), vehicle)

@@ -91,6 +91,13 @@ def flight(name: str, *overrides: str) -> Flight:
     return Flight(load_vehicle(name, overrides))
 
 
+def flight_without_cable(name: str, *overrides: str) -> Flight:
+    """A plant of a shipped vehicle whose cable breaks with the first newton; no description may say so."""
+    vehicle = load_vehicle(name, overrides)
+    weak = vehicle.cable.model_copy(update={"breaking_tension": 1e-9})
+    return Flight(vehicle.model_copy(update={"cable": weak}))
+
+
 def energy(vehicle: Vehicle, x: Array) -> Any:
     """Kinetic, potential and elastic energy of state(s) (…, 19), J; the cable's where it is stretched."""
     length = np.linalg.norm(x[..., 13:16] - x[..., 0:3], axis=-1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,8 @@ from sitl.flights.scenario import (
     scenario_vehicle,
     suited,
 )
-from sitl_bridge.vehicle.files import load_vehicle, vehicle_names
+from sitl_bridge.vehicle import files
+from sitl_bridge.vehicle.files import DescriptionError, load_vehicle, vehicle_names
 
 FLOWN = [name for name in scenario_names() if not isinstance(load_scenario(name).reference, GroundControl)]
 
@@ -59,3 +62,45 @@ def test_every_scenario_flies_every_vehicle(scenario: str, vehicle: str) -> None
     upright = 1.0 - 2.0 * (log["attitude_qx"] ** 2 + log["attitude_qy"] ** 2)
     assert np.degrees(np.arccos(upright.min())) < 50.0
     assert summary["largest_error_at_end_m"] < 3.0
+
+
+def test_paths_in_a_scenario_are_relative_to_it(tmp_path: Path) -> None:
+    iris = Path(files.__file__).parents[1] / "vehicles/iris.toml"
+    (tmp_path / "sets").mkdir()
+    (tmp_path / "mine.toml").write_text(iris.read_text(encoding="utf-8").replace('"iris"', '"mine"'))
+    (tmp_path / "sets/gps.toml").write_text('preset = "rtk"\n[gps]\nsatellites = 31\n')
+    scenario = tmp_path / "sets/flight.toml"
+    scenario.write_text(
+        'vehicle = "../mine.toml"\nset = ["sensors.preset=gps.toml"]\n[reference]\nkind = "hover"\n'
+    )
+    vehicle = scenario_vehicle(load_scenario(str(scenario)), None, [])
+    assert vehicle.name == "mine"
+    assert vehicle.sensors.gps.satellites == 31
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('[reference]\nkind = "setpont"\n', "reference.kind = 'setpont': no such kind; allowed: hover or"),
+        ('[reference]\nkind = "setpont"\n', "did you mean setpoint? (line 3)"),
+        ("[reference]\n", "reference.kind: missing"),
+        (
+            '[reference]\nkind = "setpoint"\npositon = [1, 2, 3]\n',
+            "did you mean reference.position? (line 4)",
+        ),
+        ('[reference]\nkind = "hover"\n[faults]\nrotr = 3\n', "faults.rotr = 3: no such key"),
+        ('[reference]\nkind = "hover"\n[[faults.rotor]]\nrotor = 1\nat = -1\n', "(line 6)"),
+        (
+            '[reference]\nkind = "hover"\n[[faults.rotor]]\nrotr = 1\nat = 1\n',
+            "did you mean faults.rotor.0.rotor?",
+        ),
+    ],
+)
+def test_a_fault_of_a_scenario_has_its_key_and_line(text: str, says: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('vehicle = "iris"\n' + text)
+    with pytest.raises(DescriptionError) as caught:
+        load_scenario(str(file))
+    (line,) = caught.value.faults
+    assert says in line
+    assert str(caught.value).startswith(f"{file}: ")

@@ -25,8 +25,8 @@ FAILURES = {"off": OFF, "stuck": STUCK, "garbage": GARBAGE, "wrong": WRONG, "los
 
 
 class Timed(Section):
-    at: float = quantity("s", "from the start of the scenario", ge=0)
-    duration: float | None = quantity("s", "how long; absent: for good", None, gt=0)
+    at: float = quantity("s", "from the start of the scenario", ge=0, le=1e7)
+    duration: float | None = quantity("s", "how long; absent: for good", None, gt=0, le=1e7)
 
 
 class SensorFault(Timed):
@@ -47,7 +47,7 @@ class RotorFault(Timed):
 class CableFault(Section):
     """The cable snaps, or the vehicle lets go of it: nothing joins vehicle and load from then on."""
 
-    at: float = quantity("s", "from the start of the scenario", ge=0)
+    at: float = quantity("s", "from the start of the scenario", ge=0, le=1e7)
 
 
 class LoadFault(Timed):

@@ -15,7 +15,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sitl_bridge.plant.sensors.atmosphere import air_density
-from sitl_bridge.vehicle.description import Battery, Rotor, Vehicle
+from sitl_bridge.vehicle.description import Battery, Vehicle
+from sitl_bridge.vehicle.rotors import Rotor
 
 SECONDS_PER_HOUR = 3600.0
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sitl_bridge.plant.physics.ground import contact, leg_reach
 from sitl_bridge.plant.physics.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
 from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.physics import mode_rate
 
 PARAMETERS = np.dtype(
     [
@@ -136,13 +137,7 @@ def fastest_rate(vehicle: Vehicle, lightest_load: float | None = None) -> float:
             )
             squares.append(stiffness * arms / inertia)
         modes += [(square, square * damping / stiffness) for square in squares]
-    rates = []
-    for square, double in modes:
-        half = 0.5 * double
-        rates.append(
-            half + math.sqrt(max(half * half - square, 0.0)) if half * half > square else square**0.5
-        )
-    return max(rates)
+    return max(mode_rate(square, double) for square, double in modes)
 
 
 LONGEST_STEP = 1e-3

@@ -18,8 +18,9 @@ from sitl_bridge.plant.physics.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from sitl_bridge.vehicle.description import Rotor, Vehicle
+from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
+from sitl_bridge.vehicle.rotors import Rotor
 from tests.plant.physics.stepping import Array
 
 
@@ -54,12 +55,13 @@ def cases(draw: st.DrawFn, model: str = "two-way", powered: bool = True, slack: 
         for _ in range(draw(st.integers(4, 8)))
     )
     strong = tuple(rotor.model_copy(update={"max_speed": 1e4}) for rotor in load_vehicle("paper").rotors)
+    east, north, up = draw(st.tuples(*[st.floats(0.05, 0.5)] * 3))  # second moments, kg m²
     description: dict[str, Any] = {
         "name": "random",
         "gravity": draw(st.floats(1, 15)),
         "airframe": {
             "mass": draw(st.floats(0.5, 20)),
-            "inertia": draw(st.tuples(*[st.floats(0.1, 1)] * 3)),
+            "inertia": (north + up, east + up, east + north),
         },
         "rotors": strong,
         "cable": {
