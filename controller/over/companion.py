@@ -11,8 +11,9 @@ import math
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.over.flight import Flight, State
+from controller.over.flight import Flight
 from controller.over.phases import PATIENCE, PHASES
+from controller.over.states import State
 from sitl_bridge.mavlink.framing import split
 
 HEARTBEAT_INTERVAL = 0.5

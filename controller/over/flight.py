@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import common as mavlink
@@ -19,10 +18,12 @@ from controller.over.baseline import Baseline, message, target
 from controller.over.dialects import DIALECTS, ModeNumbers
 from controller.over.identify.probe import Probe
 from controller.over.law import CompanionLaw, Setpoint, design
+from controller.over.live.reference import LiveReference
 from controller.over.load.source import LoadSource
 from controller.over.stack import Stack, full_thrust, thrust_setpoint
+from controller.over.states import State, Step
 from controller.over.telemetry import Telemetry
-from sitl_bridge.frames import Geodetic, Triple, flu_to_frd
+from sitl_bridge.frames import Geodetic, LocalOrigin, Triple, flu_to_frd
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -34,34 +35,6 @@ NEAR = 1000.0
 """m from the description's origin to the stack's."""
 LAST_TEXTS = 3
 """STATUSTEXTs of the stack that a failure repeats."""
-
-
-class State(Enum):
-    """Where a flight is, in words."""
-
-    CONNECTING = "waiting for the stack"
-    PREPARING = "waiting for the vehicle's and the load's state"
-    ARMING = "arming"
-    TAKING_OFF = "taking off"
-    STREAMING = "streaming set-points"
-    TAKING_OVER = "taking over"
-    STEADYING = "taking the swing out"
-    FLYING = "flying the load"
-    HANDING_BACK = "handing back"
-    LANDING = "landing"
-    DONE = "landed"
-    FAILED = "failed"
-
-
-class Step(NamedTuple):
-    """One step of the law."""
-
-    time_s: float
-    """Since the reference began, by the stack's clock."""
-    state: Array
-    """(18,), eq. 31."""
-    reference: Array
-    """(3,), m: where the load is to be."""
 
 
 class Flight:
@@ -78,15 +51,18 @@ class Flight:
         probe: Probe | None = None,
         baseline: Baseline | None = None,
         ages: Ages | None = None,
+        live: LiveReference | None = None,
     ) -> None:
         """path_from: the reference for a load at a place, world; duration_s: of the reference.
 
-        probe: measures how the stack follows, while the reference is flown; baseline: the stack's own
-        position control flies, and the law does not; ages: with a simulated world's time, where it is known.
+        probe: measures how the stack follows, while the reference is flown.
+        baseline: the stack's own position control flies, and the law does not.
+        ages: with a simulated world's time, where it is known.
+        live: flown instead of path_from's reference.
         """
         self.vehicle, self.stack, self.source = vehicle, stack, source
         self.path_from, self.duration_s, self.say = path_from, duration_s, say
-        self.probe, self.baseline = probe, baseline
+        self.probe, self.baseline, self.live = probe, baseline, live
         self.dialect = DIALECTS[stack.kind]
         self.design = design(vehicle, stack, accurate=source.in_world)
         self.telemetry = Telemetry()
@@ -146,6 +122,13 @@ class Flight:
         age = self.ages.age("state", now)
         synchronised = None if t.vehicle is None else t.clock.age(t.vehicle.time_s, now)
         return age if synchronised is None or self.ages.simulated else max(age, synchronised)
+
+    def state_origin(self) -> LocalOrigin | None:
+        """Of the frame of the state, on Earth; None: not known."""
+        home = self.vehicle.home
+        if self.source.in_world:
+            return LocalOrigin(home.latitude, home.longitude, home.altitude)
+        return self.telemetry.origin
 
     def world_origin(self) -> Triple:
         """Where the scenario's origin is in the frame of the state, m ENU.
@@ -234,6 +217,8 @@ class Flight:
         assert self.law is not None
         assert self.begin_time is not None
         time_s = self.stack_time - self.begin_time
+        if self.live is not None and self.live.flying:
+            self.law.path = self.live.path(time_s)
         wanted = self.law.step(estimate, time_s)
         if self.baseline is not None:
             self._send_position(self.baseline, self.law, time_s)

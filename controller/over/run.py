@@ -6,7 +6,7 @@ import math
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +15,14 @@ from controller.law.state import LOAD_POSITION
 from controller.over.ages import Ages
 from controller.over.baseline import Baseline
 from controller.over.companion import Companion
-from controller.over.flight import Flight, State, Step
+from controller.over.flight import Flight
 from controller.over.identify.probe import Probe
+from controller.over.live.link import LoadLink
+from controller.over.live.load_system import LoadSystem
+from controller.over.live.reference import LiveReference
 from controller.over.load.source import TruthSource, load_source
 from controller.over.stack import Stack
+from controller.over.states import State, Step
 from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.process import Speaker, StopRequest
@@ -42,6 +46,14 @@ LOG_COLUMNS = (
 )
 
 
+class LivePorts(NamedTuple):
+    """UDP ports of the load's own MAVLink system."""
+
+    local: int
+    peer: int
+    """Whom it speaks to first."""
+
+
 @dataclass(frozen=True)
 class OverOptions:
     """What a companion is started with."""
@@ -63,6 +75,9 @@ class OverOptions:
     """Measures how the stack follows, while the reference is flown."""
     baseline: Baseline | None = None
     """Let the stack's own position control fly instead of the law."""
+    live: LivePorts | None = None
+    """Take points live on these ports, instead of path_from's reference."""
+    instance: int = 0
 
 
 class Report:
@@ -96,6 +111,35 @@ class Report:
         )
 
 
+class Live:
+    """The load's own system on its link."""
+
+    def __init__(self, options: OverOptions, ports: LivePorts, speaker: Speaker) -> None:
+        self.reference = LiveReference(options.vehicle)
+        self._system = LoadSystem(options.instance, self.reference, speaker.say)
+        self._link = LoadLink(*ports)
+        speaker.say(
+            f"the load is system {self._system.system}: this end 127.0.0.1:{ports.local}, listen on "
+            f"udp:127.0.0.1:{ports.peer}"
+        )
+
+    def turn(self, flight: Flight, now: float) -> None:
+        """Take in what clients ask for, show them where the load is."""
+        step, system = flight.last_step, self._system
+        if step is not None:
+            system.show(step.state, flight.stack_time)
+        if system.origin is None:
+            system.origin = flight.state_origin()
+        system.home_altitude = flight.telemetry.home_altitude
+        for datagram in self._link.receive(now):
+            system.receive(datagram)
+        self._link.send(system.to_send(now), now)
+
+    def close(self) -> None:
+        """Free the port."""
+        self._link.close()
+
+
 class Log:
     """A row for each step of the law."""
 
@@ -122,6 +166,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     log = None if options.out is None else Log(options.out)
     source = load_source(options.load, options.vehicle)
     plant = source if isinstance(source, TruthSource) else None if truth is None else TruthSource()
+    live = None if options.live is None else Live(options, options.live, speaker)
     flight = Flight(
         options.vehicle,
         options.stack,
@@ -132,6 +177,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
         options.probe,
         options.baseline,
         Ages(lambda: None if plant is None else plant.time_s),
+        None if live is None else live.reference,
     )
     companion = Companion(flight, options.wait_s)
     report = Report(flight, plant, speaker)
@@ -141,9 +187,13 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
             _turn(companion, link, truth, plant)
             if log is not None:
                 log.write(flight.last_step)
+            if live is not None:
+                live.turn(flight, time.monotonic())
             report.tell(time.monotonic())
     finally:
         link.close()
+        if live is not None:
+            live.close()
         if truth is not None:
             truth.close()
         if log is not None:

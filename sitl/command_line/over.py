@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from controller.ground.link.ports import STATION_PEER
 from sitl.command_line.argument_types import STACK_TCP_PORT, STACK_UDP_PORT
 from sitl.exit_codes import FAILED, INTERRUPTED
 from sitl_bridge.mavlink.links import parse_address, parse_stack_address
@@ -19,18 +21,28 @@ from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
     from controller.feedback.truth import PathFrom
-    from controller.over.run import OverOptions
+    from controller.over.run import LivePorts, OverOptions
     from sitl.command_line.commands import Timing
     from sitl.flights.scenario import Scenario
     from sitl_bridge.mavlink.links import Address
 
 TRUTH_PORT = 19410
+LOAD_PORT = 18670
+"""UDP port of the load's own system, plus the instance; PX4 has 18570 for its own."""
 DEFAULT_DURATION = 60.0
 """s, of a reference that has none."""
 
 
 def _stack_address(arguments: argparse.Namespace) -> Address:
     return parse_stack_address(arguments.over, STACK_UDP_PORT + arguments.instance, STACK_TCP_PORT)
+
+
+def _live_ports(arguments: argparse.Namespace) -> LivePorts:
+    from controller.over.run import LivePorts
+
+    if arguments.gcs is not None:
+        return LivePorts(arguments.gcs.local, arguments.gcs.peer)
+    return LivePorts(LOAD_PORT + arguments.instance, STATION_PEER)
 
 
 def over_options(
@@ -54,6 +66,7 @@ def over_options(
         truth=truth,
         out=arguments.out,
         wait_s=arguments.wait,
+        instance=arguments.instance,
         baseline=None if arguments.baseline is None else Baseline(arguments.baseline),
     )
 
@@ -65,14 +78,16 @@ def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario
     from sitl.flights.scenario import GroundControl, Hover
 
     reference = scenario.reference if scenario else Hover(kind="hover")
-    if isinstance(reference, GroundControl):
-        raise DescriptionError(
-            "--over", ["flies a reference; expected a scenario with one, such as setpoint"]
-        )
     if scenario is not None:
         check_feasible(scenario, vehicle, "default")
     duration = arguments.duration or (scenario.duration if scenario else None) or DEFAULT_DURATION
-    options = over_options(arguments, vehicle, reference.path, duration)
+    if isinstance(reference, GroundControl):
+        options = over_options(arguments, vehicle, Hover(kind="hover").path, arguments.duration or math.inf)
+        options = replace(options, live=_live_ports(arguments))
+    else:
+        if arguments.gcs is not None:
+            raise DescriptionError("--gcs", ["goes with a scenario that leaves the load to it, such as hold"])
+        options = over_options(arguments, vehicle, reference.path, duration)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
     outcome = run(options, Speaker("controller", events=arguments.until_eof), stop)
@@ -85,7 +100,6 @@ NOT_OVER_A_STACK = {
     "in_process": "the stack is a process of its own",
     "design": "the companion has a design of its own",
     "feedback": "--load says where the load is known from",
-    "gcs": "the stack has the link to ground control",
     "onboard": "--over is the link to the stack",
     "signing_key": "the link to the stack is not signed",
     "parameters": "the stack has the parameters",
@@ -104,7 +118,7 @@ def fly_over_stack(
 ) -> int:
     """`sitl fly --over`: launch plant and companion, and report; exit code 1 when the load did not settle."""
     from sitl.flights.report import is_complete, table, written
-    from sitl.flights.scenario import load_scenario
+    from sitl.flights.scenario import GroundControl, load_scenario
     from sitl.over.flight import OverFlight, fly_over
     from sitl.over.flight import table as table_of_step
 
@@ -112,6 +126,9 @@ def fly_over_stack(
         if getattr(arguments, name) != USUAL.get(name):
             raise DescriptionError(f"--{name.replace('_', '-')}", [f"does not go with --over: {why}"])
     scenario = load_scenario(arguments.scenario)
+    live = _live_ports(arguments) if isinstance(scenario.reference, GroundControl) else None
+    if live is None and arguments.gcs is not None:
+        raise DescriptionError("--gcs", ["goes with a scenario that leaves the load to it, such as hold"])
     options = OverFlight(
         scenario_name=arguments.scenario,
         scenario=scenario,
@@ -128,7 +145,8 @@ def fly_over_stack(
         on_silence=timing.on_silence,
         rate_hz=arguments.rate,
         seed=arguments.seed,
-        duration_s=arguments.duration or scenario.duration or DEFAULT_DURATION,
+        duration_s=arguments.duration or scenario.duration or (math.inf if live else DEFAULT_DURATION),
+        live=None if live is None else (live.local, live.peer),
         wait_s=arguments.wait,
         instance=arguments.instance,
         out=arguments.out,

@@ -55,6 +55,9 @@ class OverFlight:
     rate_hz: float
     seed: int
     duration_s: float
+    """Infinite: until stopped."""
+    live: tuple[int, int] | None
+    """UDP ports of the load's own system, where ground control moves it: our own and its peer's."""
     wait_s: float
     instance: int
     out: Path | None
@@ -63,10 +66,6 @@ class OverFlight:
 
     def check(self) -> None:
         """Raises DescriptionError or OSError for what cannot be flown, before anything is launched."""
-        if isinstance(self.scenario.reference, GroundControl):
-            raise DescriptionError(
-                "--over", ["flies a reference; expected a scenario with one, such as setpoint"]
-            )
         faults = self.scenario.faults
         if faults != type(faults)():
             raise DescriptionError(
@@ -106,7 +105,11 @@ class OverFlight:
         plant += ["--truth-to", f"127.0.0.1:{truth_port}", "--out", str(out / PLANT_FOLDER)]
         if self.truth_to is not None:
             plant += ["--truth-to", "{}:{}".format(*self.truth_to)]
-        companion = ["controller", "--scenario", self.scenario_name, "--duration", repr(self.duration_s)]
+        companion = ["controller", "--scenario", self.scenario_name, "--instance", str(self.instance)]
+        if math.isfinite(self.duration_s):
+            companion += ["--duration", repr(self.duration_s)]
+        if self.live is not None:
+            companion += ["--gcs", "{}:{}".format(*self.live)]
         if self.vehicle is not None:
             companion += ["--vehicle", self.vehicle]
         for text in self.overrides:
@@ -160,9 +163,8 @@ def report(options: OverFlight, out: Path, account: Account) -> dict[str, Any]:
             failure = f"{failure}; {error}" if failure else str(error)
     facts = _facts(options, account, failure)
     reference = options.scenario.reference
-    assert not isinstance(reference, GroundControl)
     path = None
-    if flown:
+    if flown and not isinstance(reference, GroundControl):
         log = read_state_log(out / FILE_NAME)
         x, y, z = positions(log, "load")[0].tolist()
         path = reference.path((x, y, z))

@@ -47,13 +47,13 @@ class StandIn:
         """The address of the stack."""
         return f"udpin:127.0.0.1:{self.onboard_peer}"
 
-    def start_companion(self, *arguments: str, over: str | None = None) -> Process:
+    def start_companion(self, *arguments: str, over: str | None = None, scenario: str = "hover") -> Process:
         """A companion that holds the load on truth.
 
         A stack turns on with the last body rates until it notices that there are no more: in hover with none.
         """
         truth = ("--load", "truth", "--truth-from", f"udpin:127.0.0.1:{self.truth}")
-        reference = ("--scenario", "hover", *IRIS)
+        reference = ("--scenario", scenario, *IRIS)
         return self._start("controller", *reference, "--over", over or self.over, *truth, *arguments)
 
 

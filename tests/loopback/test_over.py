@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -109,11 +110,10 @@ def test_without_a_stack_it_says_so_and_ends(start: Start, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("hold",), "flies a reference"),
         (("gps-jump",), "faults"),
         (("setpoint", "--in-process"), "--in-process: does not go with --over"),
         (("setpoint", "--feedback", "truth"), "--load says"),
-        (("setpoint", "--gcs", "1:2"), "--gcs: does not go with --over"),
+        (("setpoint", "--gcs", "1:2"), "--gcs: goes with a scenario that leaves the load to it"),
         (("setpoint", "--stack", "no-such-file.toml"), "no-such-file.toml"),
         (("setpoint", "--truth-from", "udpin"), "--truth-from"),
     ],
@@ -150,3 +150,42 @@ def test_identify_finds_the_rotors_lag_and_thrust(start: Start, tmp_path: Path) 
     assert found["rate_lag"] + found["delay"] > 0.06
     stack = read_stack(file)
     assert stack.model_dump() == {key: found[key] for key in stack.model_dump()}
+
+
+@pytest.mark.timeout(400)
+def test_the_load_is_moved_live_while_the_stack_flies(start: Start, tmp_path: Path) -> None:
+    stand_in = StandIn(start, tmp_path)
+    stand_in.start_plant()
+    stand_in.start_stack()
+    local, peer = free_ports(2)
+    client = PyMav(f"udpin:127.0.0.1:{peer}")
+    try:
+        companion = stand_in.start_companion("--gcs", f"{local}:{peer}", scenario="hold")
+        companion.wait_for("flying the load")
+        here = client.wait_for("LOCAL_POSITION_NED", system=101)
+        mask = 0b1101_1111_1000
+        client.link.mav.set_position_target_local_ned_send(
+            0, 101, 35, 1, mask, here.x + 2.0, here.y, here.z - 1.0, *(0.0,) * 8
+        )
+        client.wait(
+            lambda m: (
+                m.get_type() == "LOCAL_POSITION_NED"
+                and m.get_srcSystem() == 101
+                and math.dist((m.x, m.y, m.z), (here.x + 2.0, here.y, here.z - 1.0)) < 0.1
+            ),
+            "the load at its point",
+        )
+        place = client.wait_for("GLOBAL_POSITION_INT", system=101)
+        client.link.mav.command_int_send(
+            101, 35, 5, 192, 0, 0, -1.0, 0, 0, math.nan, place.lat, place.lon, 1e-3 * place.alt + 1.0
+        )
+        client.wait(
+            lambda m: (
+                m.get_type() == "GLOBAL_POSITION_INT"
+                and m.get_srcSystem() == 101
+                and abs(m.alt - place.alt - 1000) < 100
+            ),
+            "the load a metre higher",
+        )
+    finally:
+        client.close()

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.over.ages import LONGEST_STANDSTILL, Ages
-from controller.over.flight import State
 from controller.over.law import stable
 from controller.over.load.pendulum_filter import PendulumFilter
 from controller.over.stack import Stack, full_thrust, thrust_setpoint
+from controller.over.states import State
 from controller.over.telemetry import ClockOffset
 from sitl_bridge.plant.physics.state import SPECIFIC_FORCE
 from sitl_bridge.plant.physics.world import World

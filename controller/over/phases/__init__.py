@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from controller.over.flight import Flight, State
+from controller.over.flight import Flight
 from controller.over.phases.before import arm, connect, prepare, take_off
 from controller.over.phases.land import hand_back, land
 from controller.over.phases.law import fly, steady, stream, take_over
+from controller.over.states import State
 
 
 def _over(flight: Flight, now: float) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.over import dialects
-from controller.over.flight import Flight, State
+from controller.over.flight import Flight
 from controller.over.law import RATE_HZ
+from controller.over.states import State
 
 STREAMS = (
     (mavlink.MAVLINK_MSG_ID_ODOMETRY, RATE_HZ),

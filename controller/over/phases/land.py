@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.over.flight import Flight, State
+from controller.over.flight import Flight
 from controller.over.phases.law import OTHER_MODE, unfit
+from controller.over.states import State
 
 
 def hand_back(flight: Flight, now: float) -> None:

@@ -16,8 +16,9 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
-from controller.over.flight import Flight, State
+from controller.over.flight import Flight
 from controller.over.law import CompanionLaw
+from controller.over.states import State
 
 LONGEST_STATE_AGE = 0.2
 """s; older, and nothing is sent."""
@@ -113,6 +114,8 @@ def _begin(flight: Flight, now: float) -> None:
     assert flight.ramp_time is not None
     path = flight.reference(flight.law.reference)
     path["ramp_time"], path["yaw"] = flight.ramp_time, flight.law.path["yaw"]
+    if flight.live is not None:
+        path = flight.live.start(flight.law.reference, float(path["yaw"][0]))
     flight.law.path, flight.begin_time = path, flight.stack_time
     flight.say("flying the load")
     flight.go(State.FLYING, now)
