@@ -20,7 +20,8 @@ from controller.over.identify.probe import Probe
 from controller.over.live.link import LoadLink
 from controller.over.live.load_system import LoadSystem
 from controller.over.live.reference import LiveReference
-from controller.over.load.source import TruthSource, load_source
+from controller.over.load.filtered import load_source
+from controller.over.load.source import TruthSource
 from controller.over.stack import Stack
 from controller.over.states import State, Step
 from sitl_bridge.mavlink.framing import split
@@ -65,7 +66,9 @@ class OverOptions:
     duration_s: float
     stack: Stack = field(default_factory=Stack)
     load: str = "none"
-    """Where the load is known from: truth, position or none."""
+    """Where the load is known from: truth, tracker, position or none."""
+    load_link: Address | None = None
+    """Link on which a load sensor's messages come, besides the stack's own."""
     truth: Address | None = None
     """Link on which the plant's truth comes: to fly on with load = truth, else for the record."""
     out: Path | None = None
@@ -163,6 +166,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     """Fly once over a stack; returns what to report of it. Raises OSError when a link cannot be opened."""
     link = open_link(options.over, speaker.say, punctual=True)
     truth = None if options.truth is None else open_link(options.truth, speaker.say)
+    sensor = None if options.load_link is None else open_link(options.load_link, speaker.say)
     log = None if options.out is None else Log(options.out)
     source = load_source(options.load, options.vehicle)
     plant = source if isinstance(source, TruthSource) else None if truth is None else TruthSource()
@@ -184,7 +188,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     speaker.say(f"{options.vehicle.name}: waiting for a flight stack on {options.over}")
     try:
         while stop.reason is None and not companion.over:
-            _turn(companion, link, truth, plant)
+            _turn(companion, link, sensor, truth, plant)
             if log is not None:
                 log.write(flight.last_step)
             if live is not None:
@@ -194,8 +198,9 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
         link.close()
         if live is not None:
             live.close()
-        if truth is not None:
-            truth.close()
+        for other in (truth, sensor):
+            if other is not None:
+                other.close()
         if log is not None:
             log.close()
     if stop:
@@ -211,7 +216,9 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     return outcome
 
 
-def _turn(companion: Companion, link: Link, truth: Link | None, plant: TruthSource | None) -> None:
+def _turn(
+    companion: Companion, link: Link, sensor: Link | None, truth: Link | None, plant: TruthSource | None
+) -> None:
     """What the links bring until something is due, and what is due."""
     received = [link.receive(min(companion.next_deadline(), time.monotonic() + LONGEST_TURN))]
     while received[-1] is not None and len(received) < MOST_DATAGRAMS:
@@ -223,6 +230,9 @@ def _turn(companion: Companion, link: Link, truth: Link | None, plant: TruthSour
             if plant is not None and plant is not companion.flight.source:
                 for frame in split(datagram).frames:
                     plant.hear(frame, now)
+    if sensor is not None:
+        while (datagram := sensor.receive(0.0)) is not None:
+            companion.receive(datagram, now)
     for datagram in received:
         if datagram is not None:
             companion.receive(datagram, now)

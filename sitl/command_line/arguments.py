@@ -269,10 +269,17 @@ def _over(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--load",
-        choices=("truth", "position", "none"),
+        choices=("truth", "tracker", "position", "none"),
         default="none",
-        help="where the load is known from: the plant's truth, its own GLOBAL_POSITION_INT, or no sensor "
-        "(default: none)",
+        help="where the load is known from: the plant's truth, LANDING_TARGET of a tracker, its own "
+        "GLOBAL_POSITION_INT, or no sensor (default: none)",
+    )
+    group.add_argument(
+        "--load-from",
+        metavar="ADDRESS",
+        type=link_address,
+        help="where a load sensor's messages come, besides the stack's link (`fly` arranges it for the "
+        "plant's)",
     )
     group.add_argument(
         "--truth-from",

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sitl_bridge.mavlink.links import Address
 
 TRUTH_PORT = 19410
+LOAD_TO_PORT = 19411
 LOAD_PORT = 18670
 """UDP port of the load's own system, plus the instance; PX4 has 18570 for its own."""
 DEFAULT_DURATION = 60.0
@@ -63,6 +64,7 @@ def over_options(
         duration_s=duration_s,
         stack=Stack() if arguments.stack is None else read_stack(arguments.stack),
         load=arguments.load,
+        load_link=None if arguments.load_from is None else parse_address(arguments.load_from, LOAD_TO_PORT),
         truth=truth,
         out=arguments.out,
         wait_s=arguments.wait,
@@ -116,7 +118,10 @@ def fly_over_stack(
     overrides: Sequence[str],
     audience: Callable[[argparse.Namespace, Vehicle], AbstractContextManager[tuple[str, int] | None]],
 ) -> int:
-    """`sitl fly --over`: launch plant and companion, and report; exit code 1 when the load did not settle."""
+    """`sitl fly --over`: launch plant and companion, and report; exit code 1 when the load did not settle.
+
+    A live flight ends when it is stopped, with exit code 0.
+    """
     from sitl.flights.report import is_complete, table, written
     from sitl.flights.scenario import GroundControl, load_scenario
     from sitl.over.flight import OverFlight, fly_over
@@ -151,8 +156,10 @@ def fly_over_stack(
         instance=arguments.instance,
         out=arguments.out,
     )
-    if arguments.truth_from is not None:
-        raise DescriptionError("--truth-from", ["`fly` arranges it; expected with `controller` only"])
+    for flag in ("truth_from", "load_from"):
+        if getattr(arguments, flag) is not None:
+            name = f"--{flag.replace('_', '-')}"
+            raise DescriptionError(name, ["`fly` arranges it; expected with `controller` only"])
     stop = StopRequest()
     stop.install()
     with audience(arguments, options.told()) as viewer:
@@ -166,6 +173,8 @@ def fly_over_stack(
             print(table_of_step(summary, width))
         for file in written(out):
             print(f"  {file}")
+    if live is not None:  # ends when it is stopped, as under our own autopilot
+        return 0 if stop or summary["completed"] else FAILED
     if stop:
         return INTERRUPTED
     return 0 if summary["settled"] else FAILED

@@ -29,6 +29,8 @@ from sitl_bridge.vehicle.files import DescriptionError, Override, load_vehicle
 
 PLANT_FOLDER = "plant"
 """In a flight's folder: the plant's logs of everything, from arming to landing."""
+WITH_SENSOR = ("tracker", "position")
+"""Sources of the load's state that listen to the plant's `--load-to`."""
 ON_THE_GROUND = "initial.start=ground"
 
 
@@ -73,6 +75,9 @@ class OverFlight:
             )
         if self.stack is not None:
             read_stack(self.stack)
+        if self.load == "tracker" and self.told().sensors.tracker is None:
+            expected = "expected a tracker, as by --set sensors.tracker.rate=20"
+            raise DescriptionError("--load tracker", [f"{self.told().name} has none; {expected}"])
         load_vehicle(self.vehicle or self.scenario.vehicle, self.of_plant())
         check_feasible(self.scenario, self.told(), "default")
         open_link(self.hil, lambda text: None).close()
@@ -91,7 +96,7 @@ class OverFlight:
         """The vehicle as the companion is told."""
         return scenario_vehicle(self.scenario, self.vehicle, self.overrides)
 
-    def command_lines(self, out: Path, truth_port: int) -> tuple[list[str], list[str]]:
+    def command_lines(self, out: Path, truth_port: int, load_port: int) -> tuple[list[str], list[str]]:
         """Arguments of `sitl plant` and of `sitl controller`."""
         plant = ["plant", "--vehicle", self.vehicle or self.scenario.vehicle]
         for override in self.of_plant():
@@ -103,6 +108,8 @@ class OverFlight:
         if self.speed is not None:
             plant += ["--speed", repr(self.speed)]
         plant += ["--truth-to", f"127.0.0.1:{truth_port}", "--out", str(out / PLANT_FOLDER)]
+        if self.load in WITH_SENSOR:
+            plant += ["--load-to", f"127.0.0.1:{load_port}"]
         if self.truth_to is not None:
             plant += ["--truth-to", "{}:{}".format(*self.truth_to)]
         companion = ["controller", "--scenario", self.scenario_name, "--instance", str(self.instance)]
@@ -116,6 +123,8 @@ class OverFlight:
             companion += ["--set", text]
         companion += ["--over", self.over, "--load", self.load, "--wait", repr(self.wait_s)]
         companion += ["--truth-from", f"udpin:127.0.0.1:{truth_port}", "--out", str(out)]
+        if self.load in WITH_SENSOR:
+            companion += ["--load-from", f"udpin:127.0.0.1:{load_port}"]
         if self.baseline is not None:
             companion += ["--baseline", self.baseline]
         if self.stack is not None:
@@ -133,10 +142,10 @@ def fly_over(options: OverFlight, stop: StopRequest) -> tuple[dict[str, Any], Pa
     out = options.out
     out.mkdir(parents=True, exist_ok=True)
     clear(out)
-    [truth_port] = free_ports(1)
+    truth_port, load_port = free_ports(2)
     account = Account()
     with Display() as display:
-        children = Children(*options.command_lines(out, truth_port), display.messages)
+        children = Children(*options.command_lines(out, truth_port, load_port), display.messages)
         children.watch(account, stop, lambda event: display.show(status(event)))
     if account.failure:
         print(f"fly: {account.failure}", file=sys.stderr, flush=True)

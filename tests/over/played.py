@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.law.reference import Path, setpoint
 from controller.over.companion import Companion
 from controller.over.flight import OUR_SYSTEM, Flight
-from controller.over.load.source import load_source
+from controller.over.load.filtered import load_source
 from controller.over.stack import Stack
 from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.vehicle.files import load_vehicle

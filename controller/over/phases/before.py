@@ -74,7 +74,7 @@ def _missing(flight: Flight, now: float) -> str:
         wanted.append("the stack's ODOMETRY, or LOCAL_POSITION_NED and ATTITUDE_QUATERNION")
     if t.altitude_msl is None or t.home_altitude is None:
         wanted.append("the stack's GLOBAL_POSITION_INT")
-    source = flight.source.missing(t, now)
+    source = flight.source.missing(t, now, hanging=False)
     if source is not None:
         wanted.append(source)
     return ", ".join(wanted)

@@ -40,9 +40,10 @@ OTHER_MODE = "the operator, or a failsafe, took another mode: nothing is sent an
 
 def stream(flight: Flight, now: float) -> None:
     """Set-points come before the mode: a stack takes offboard only while they do."""
-    flight.missing = f"the state of vehicle and load ({flight.source.missing(flight.telemetry, now)})"
+    missing = flight.source.missing(flight.telemetry, now)
+    flight.missing = missing or "the state of vehicle and load"
     estimate = flight.new_estimate(now)
-    if estimate is None:
+    if estimate is None or missing is not None:
         return
     if flight.ramp_time is None:
         flight.ramp_time = _plan(flight, estimate)

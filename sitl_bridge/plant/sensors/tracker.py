@@ -74,6 +74,10 @@ class LoadTracker:
         self.doing = WORKS
         """What the camera does, as of the instruments; set by faults."""
         self._delay = self.late * tick_period
+        self.newest: Sighting | None = None
+        """The sighting that has arrived last; None: none has."""
+        self.arrived = 0
+        """How many have arrived."""
         self._under_way: deque[tuple[int, Sighting]] = deque()
         self._last: Sighting | None = None
         self._white = stream(seed, "tracker.white")
@@ -95,5 +99,7 @@ class LoadTracker:
                 self._last = seen
                 self._under_way.append((tick + self.late, seen))
         if self._under_way and self._under_way[0][0] <= tick:
-            return self._under_way.popleft()[1]
+            self.newest = self._under_way.popleft()[1]
+            self.arrived += 1
+            return self.newest
         return None

@@ -202,4 +202,20 @@ def test_load_to_shows_the_load_to_maps_of_both_kinds() -> None:
             else:
                 assert (frame.system, frame.component) == (101 + INSTANCE, 35)
     assert counts["HEARTBEAT"] == counts["ADSB_VEHICLE"] == pytest.approx(10, abs=1)
-    assert counts["GLOBAL_POSITION_INT"] == pytest.approx(50, abs=3)
+    assert counts["GLOBAL_POSITION_INT"] == pytest.approx(100, abs=5)
+
+
+def test_load_to_shows_each_sighting_of_a_tracker_once() -> None:
+    vehicle = load_vehicle("iris", ["initial.start=hover", "sensors.tracker.rate=20"])
+    simulation = Simulation(vehicle, RATE, seed=0, instance=INSTANCE)
+    load = LoadTo(INSTANCE, simulation.origin)
+    tracker = simulation.world.tracker
+    assert tracker is not None
+    seen = []
+    for tick in range(1, round(RATE) + 1):
+        tracker.sample(tick, simulation.world.state)
+        datagram = load.to_send(100.0 + tick / RATE, 4000 * tick, simulation.world)
+        messages = [decode(frame) for frame in split(datagram or b"").frames]
+        seen += [m for m in messages if m.get_type() == "LANDING_TARGET"]
+    assert len(seen) == 20
+    assert seen[0].z == pytest.approx(vehicle.hover_length, abs=1e-3)
