@@ -21,6 +21,7 @@ from sitl.command_line.doctor import add_doctor
 from sitl.command_line.export import add_export
 from sitl.command_line.identify import add_identify
 from sitl.command_line.sweep import add_sweep
+from sitl.command_line.vehicle import add_vehicle
 from sitl.command_line.view import add_view
 from sitl.command_line.warmup import add_warmup
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
@@ -127,6 +128,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_export(commands)
     add_view(commands)
     add_sweep(commands)
+    add_vehicle(commands)
     add_warmup(commands)
     add_doctor(commands)
     add_completion(commands)

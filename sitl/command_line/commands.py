@@ -17,6 +17,7 @@ from sitl.command_line.doctor import run_doctor
 from sitl.command_line.export import run_export
 from sitl.command_line.identify import run_identify
 from sitl.command_line.sweep import run_sweep
+from sitl.command_line.vehicle import run_vehicle
 from sitl.command_line.view import run_view
 from sitl.command_line.warmup import run_warmup
 from sitl.exit_codes import FAILED, INTERRUPTED, USAGE
@@ -286,6 +287,7 @@ COMMANDS = {
     "export": run_export,
     "view": run_view,
     "sweep": run_sweep,
+    "vehicle": run_vehicle,
     "warmup": run_warmup,
     "doctor": run_doctor,
     "completion": run_completion,

@@ -115,7 +115,7 @@ def _elsewhere(model: type[BaseModel], key: str) -> str:
     found = [
         f"{name}.{key}"
         for name, field in model.model_fields.items()
-        if any(key in table.model_fields for table in _tables(field.annotation)) and name != key
+        if any(key in table.model_fields for table in tables_of(field.annotation)) and name != key
     ]
     return " or ".join(found) if len(found) <= 3 else ""
 
@@ -134,7 +134,7 @@ def _line(place: _Place, fault: Any) -> str:
     where, field, kind = dotted(place.keys), place.field, fault["type"]
     if kind.startswith("union_tag"):
         return _tag_line(where, fault)
-    unit = _unit(field)
+    unit = unit_of(field)
     problem = _PROBLEMS.get(kind, fault["msg"].removeprefix("Value error, "))
     if kind == "missing":
         return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
@@ -176,22 +176,22 @@ def _place(model: type[BaseModel], location: Location) -> _Place:
             continue
         owner, field = table, None if table is None else table.model_fields.get(part)
         union = field if field is not None and field.discriminator is not None else None
-        table = None if field is None or union is not None else next(_tables(field.annotation), None)
+        table = None if field is None or union is not None else next(tables_of(field.annotation), None)
     return _Place(tuple(keys), field, owner)
 
 
-def _tables(annotation: Any) -> Iterator[type[BaseModel]]:
+def tables_of(annotation: Any) -> Iterator[type[BaseModel]]:
     """The tables that a field can be, or be a list of."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in get_args(annotation):
-        yield from _tables(part)
+        yield from tables_of(part)
 
 
 def _member(union: FieldInfo, tag: str) -> type[BaseModel] | None:
     """The table of a union whose discriminator has this value."""
     key = str(union.discriminator)
-    of_tag = (t for t in _tables(union.annotation) if tag in get_args(t.model_fields[key].annotation))
+    of_tag = (t for t in tables_of(union.annotation) if tag in get_args(t.model_fields[key].annotation))
     return next(of_tag, None)
 
 
@@ -200,7 +200,18 @@ def _options(field: FieldInfo | None) -> list[str]:
     return [option for option in get_args(field.annotation) if isinstance(option, str)] if field else []
 
 
-def _unit(field: FieldInfo | None) -> str:
+def comment_of(model: type[BaseModel], key: str) -> str:
+    """A key of a table in a comment: its unit, what it is, and its range."""
+    field = model.model_fields[key]
+    unit, allowed = unit_of(field), _expectation(field)
+    what = ", ".join(part for part in (unit, field.description or "") if part)
+    # A range that is the same on both sides of 0 only keeps nonsense out.
+    ranged = "" if ">= -" in allowed or not any(sign in allowed for sign in "<>") else f" ({allowed})"
+    return what + ranged
+
+
+def unit_of(field: FieldInfo | None) -> str:
+    """The unit of a declared field; empty: it has none."""
     extra = field.json_schema_extra if field else None
     unit = extra.get("unit", "") if isinstance(extra, dict) else ""
     return "" if unit in ("-", "") else str(unit)

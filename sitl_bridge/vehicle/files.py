@@ -21,6 +21,7 @@ __all__ = [
     "DescriptionError",
     "Override",
     "beside",
+    "completed",
     "is_path",
     "load_vehicle",
     "preset_names",
@@ -99,10 +100,14 @@ def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = (
         source, content = read_toml(vehicle, resources.files("sitl_bridge") / "vehicles", "vehicle")
     changes = [o if isinstance(o, Override) else Override(o) for o in overrides]
     apply_overrides(content, changes)
-    if isinstance(sensors := content.get("sensors"), dict):
-        said_by = _origin("", changes)(("sensors", "preset"))
-        content["sensors"] = _on_preset(sensors, "" if said_by else source)
-    return validated(Vehicle, content, source, _origin(source, changes))
+    said_by = _origin("", changes)(("sensors", "preset"))
+    return validated(Vehicle, completed(content, "" if said_by else source), source, _origin(source, changes))
+
+
+def completed(content: dict[str, Any], source: str = "") -> dict[str, Any]:
+    """A vehicle's content with its sensors on top of their preset. source: the file that names the preset."""
+    sensors = content.get("sensors")
+    return {**content, "sensors": _on_preset(sensors, source)} if isinstance(sensors, dict) else content
 
 
 def _on_preset(sensors: dict[str, Any], source: str) -> dict[str, Any]:
