@@ -9,11 +9,10 @@ import pytest
 
 TOP = Path(__file__).parent.parent
 MAP = (TOP / "docs/architecture.md").read_text(encoding="utf-8")
-README = (TOP / "README.md").read_text(encoding="utf-8")
-SECTION = README[README.index("## Architecture") : README.index("**Clocks.**")]
+OVERVIEW = (TOP / "docs/explanation.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("text", [MAP, SECTION], ids=["map", "README"])
+@pytest.mark.parametrize("text", [MAP, OVERVIEW], ids=["map", "overview"])
 def test_every_path_exists(text: str) -> None:
     paths = re.findall(r"`([a-z_]+/[\w/.-]*)`", text)
     assert len(paths) > 10

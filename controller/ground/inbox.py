@@ -36,7 +36,7 @@ _BROADCAST = 0
 _SAME_PLACE = 10
 """Degrees times 1e7 between two places that count as one, 0.1 m"""
 _NO_SHELL = b"no shell here; use parameters and commands\n"
-_NOT_FLOWN = {
+NOT_FLOWN = {
     mavlink.MAVLINK_MSG_ID_SET_ACTUATOR_CONTROL_TARGET: "Actuator set-points are not flown; send positions",
     mavlink.MAVLINK_MSG_ID_SETUP_SIGNING: "Signing keys are not taken over a link; use --signing-key FILE",
 }
@@ -73,13 +73,13 @@ class Inbox:
         number = frame.message_id  # not message.id: some messages have a field of that name
         if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:
             self._peers.last_station = now
-        handler = _HANDLERS.get(number)
+        handler = HANDLERS.get(number)
         if handler is not None:
             handler(self, message, frame, peer, now)
         elif number in mission_protocol.MESSAGES:
             self._mission(message, frame, peer, now)
-        elif number in _NOT_FLOWN:
-            self._out.say_seldom(peer, _NOT_FLOWN[number], now)
+        elif number in NOT_FLOWN:
+            self._out.say_seldom(peer, NOT_FLOWN[number], now)
 
     def _addressed(self, message: Any, components: tuple[int, ...] = (0, COMPONENT_AUTOPILOT)) -> bool:
         """Whether a message is for the vehicle."""
@@ -257,7 +257,7 @@ class Inbox:
 
 
 _Handler = Callable[[Inbox, Any, Frame, Peer, float], None]
-_HANDLERS: dict[int, _Handler] = {
+HANDLERS: dict[int, _Handler] = {
     mavlink.MAVLINK_MSG_ID_COMMAND_LONG: Inbox._command,
     mavlink.MAVLINK_MSG_ID_COMMAND_INT: Inbox._command,
     mavlink.MAVLINK_MSG_ID_SET_MODE: Inbox._set_mode,
