@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from typing import Any
 
 from sitl.command_line.arguments import build_parser
 from sitl.reference_pages.tables import page, table
@@ -11,8 +12,8 @@ from sitl.reference_pages.tables import page, table
 
 def markdown() -> str:
     """The page."""
-    parser = build_parser()
-    commands = next(a for a in parser._actions if isinstance(a, argparse._SubParsersAction))
+    commands = _commands(build_parser())
+    assert commands is not None
     summaries = {action.dest: action.help or "" for action in commands._choices_actions}
     overview = table(
         ("command", "what it does"),
@@ -24,8 +25,23 @@ def markdown() -> str:
         *("| 0 | it worked; of a flight: the load settled |", "| 1 | it did not, or a process failed |"),
         *("| 2 | the command line, a file or a description is wrong |", "| 130 | ended by Ctrl-C |"),
     ]
-    sections = [_section(f"sitl {name}", command) for name, command in commands.choices.items()]
+    sections = [
+        part for name, command in commands.choices.items() for part in _sections(f"sitl {name}", command)
+    ]
     return page("Command line", "the command line's parser", overview, about, *sections)
+
+
+def _commands(parser: argparse.ArgumentParser) -> Any:
+    """The action that holds a parser's commands; None: it has none."""
+    return next((a for a in parser._actions if isinstance(a, argparse._SubParsersAction)), None)
+
+
+def _sections(name: str, parser: argparse.ArgumentParser) -> Iterator[list[str]]:
+    """The section of a command, then those of the commands in it."""
+    yield _section(name, parser)
+    inner = _commands(parser)
+    for deeper, command in inner.choices.items() if inner else ():
+        yield from _sections(f"{name} {deeper}", command)
 
 
 def _section(name: str, parser: argparse.ArgumentParser) -> list[str]:
@@ -37,7 +53,10 @@ def _section(name: str, parser: argparse.ArgumentParser) -> list[str]:
 
 def _shown(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
     for action in parser._actions:
-        if not isinstance(action, argparse._HelpAction) and action.help != argparse.SUPPRESS:
+        if (
+            not isinstance(action, argparse._HelpAction | argparse._SubParsersAction)
+            and action.help != argparse.SUPPRESS
+        ):
             yield action
 
 
