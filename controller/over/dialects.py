@@ -43,7 +43,11 @@ class Dialect(NamedTuple):
     relative_takeoff: bool
     """Whether NAV_TAKEOFF's altitude is above home, not above the sea."""
     thrust_parameter: str | None
-    """Parameter with the curve from set-point to force."""
+    """Parameter with the curve from set-point to force, as in `Stack`."""
+    thrust_curve: float
+    """That curve where no parameter says it."""
+    options: tuple[str, int, str] | None
+    """Parameter, bits that have to be set in it before thrust is taken for thrust, and what it means else."""
     patience_parameter: str | None
     """Parameter that says for how many seconds the last set-point is flown when no more come."""
 
@@ -56,6 +60,8 @@ PX4 = Dialect(
     takeoff_mode=None,
     relative_takeoff=False,
     thrust_parameter="THR_MDL_FAC",
+    thrust_curve=0.0,
+    options=None,
     patience_parameter="COM_OF_LOSS_T",
 )
 ARDUCOPTER = Dialect(
@@ -65,10 +71,18 @@ ARDUCOPTER = Dialect(
     land=_arducopter(9),
     takeoff_mode=_arducopter(4),
     relative_takeoff=True,
-    thrust_parameter="MOT_THST_EXPO",
+    thrust_parameter=None,  # it linearises its motors itself, by MOT_THST_EXPO
+    thrust_curve=1.0,
+    options=("GUID_OPTIONS", 8, "thrust of a set-point is a climb rate"),
     patience_parameter="GUID_TIMEOUT",
 )
 DIALECTS = {"px4": PX4, "ardupilot": ARDUCOPTER}
+_BY_AUTOPILOT = {mavlink.MAV_AUTOPILOT_PX4: PX4, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: ARDUCOPTER}
+
+
+def dialect_of(autopilot: int, otherwise: Dialect) -> Dialect:
+    """By what the stack's HEARTBEAT says it is."""
+    return _BY_AUTOPILOT.get(autopilot, otherwise)
 
 
 def set_mode(system: int, numbers: ModeNumbers) -> mavlink.MAVLink_command_long_message:

@@ -181,7 +181,8 @@ class Flight:
         """SET_ATTITUDE_TARGET with body rates and thrust; the thrust set-point, 0 to 1."""
         curve = self.stack.thrust_curve
         if curve is None:
-            curve = self.telemetry.parameters.get(self.dialect.thrust_parameter or "", 0.0)
+            dialect = self.dialect
+            curve = self.telemetry.parameters.get(dialect.thrust_parameter or "", dialect.thrust_curve)
         thrust = thrust_setpoint(wanted.thrust, self._full, curve)
         milliseconds = round(self.stack_time * 1e3) & 0xFFFFFFFF
         self.pack(

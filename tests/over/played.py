@@ -37,6 +37,8 @@ class PlayedStack:
         self.frozen = False
         self.setpoints: list[Any] = []
         self.commands: list[Any] = []
+        self.autopilot = mavlink.MAV_AUTOPILOT_PX4
+        self.parameters = {"THR_MDL_FAC": 1.0, "COM_OF_LOSS_T": 1.0}
         self._ticks = 0
 
     def receive(self, datagram: bytes) -> list[bytes]:
@@ -47,15 +49,19 @@ class PlayedStack:
             if message.get_type() == "SET_ATTITUDE_TARGET":
                 self.setpoints.append(message)
             elif message.get_type() == "PARAM_REQUEST_READ":
-                out.append(mavlink.MAVLink_param_value_message(b"THR_MDL_FAC", 1.0, 9, 1, 0))
+                name = message.param_id.rstrip("\0")
+                if name in self.parameters:
+                    value = self.parameters[name]
+                    out.append(mavlink.MAVLink_param_value_message(name.encode(), value, 9, 1, 0))
             elif message.get_type() == "COMMAND_LONG":
                 self.commands.append(message)
                 if not self.arms:
                     out += NO_LOCK
-                out.append(mavlink.MAVLink_command_ack_message(message.command, self._obey(message)))
+                out.append(mavlink.MAVLink_command_ack_message(message.command, self.obey(message)))
         return [self._packer.pack(message) for message in out]
 
-    def _obey(self, message: Any) -> int:
+    def obey(self, message: Any) -> int:
+        """What it does with a command; a MAV_RESULT."""
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
             if not self.arms:
                 return int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
@@ -77,28 +83,32 @@ class PlayedStack:
         flag = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
         out = []
         if self._ticks % 50 == 1:
-            out.append(mavlink.MAVLink_heartbeat_message(2, 12, 1 | flag, self.mode, 4, 3))
+            out.append(mavlink.MAVLink_heartbeat_message(2, self.autopilot, 1 | flag, self.mode, 4, 3))
             height = round(1000 * self.height)
             out.append(
                 mavlink.MAVLink_global_position_int_message(1, 0, 0, 488_000 + height, height, 0, 0, 0, 0)
             )
         if not self.frozen:
             out.append(mavlink.MAVLink_highres_imu_message(round(1e6 * self.now), *IMU_AT_REST))
-            nan = [math.nan] + [0.0] * 20
-            zeros = (0.0,) * 6
-            out.append(
-                mavlink.MAVLink_odometry_message(
-                    round(1e6 * self.now), 1, 12, 0.0, 0.0, -self.height, [1, 0, 0, 0], *zeros, nan, nan
-                )
-            )
+            out += self.state()
         return b"".join(self._packer.pack(message) for message in out)
+
+    def state(self) -> list[Any]:
+        """The messages with where the vehicle is."""
+        nan = [math.nan] + [0.0] * 20
+        zeros = (0.0,) * 6
+        return [
+            mavlink.MAVLink_odometry_message(
+                round(1e6 * self.now), 1, 12, 0.0, 0.0, -self.height, [1, 0, 0, 0], *zeros, nan, nan
+            )
+        ]
 
 
 class Played:
     """A companion against the played stack, in played time."""
 
-    def __init__(self, duration: float = 2.0, wait_s: float = 60.0) -> None:
-        self.stack, self.said = PlayedStack(), list[str]()
+    def __init__(self, duration: float = 2.0, wait_s: float = 60.0, stack: PlayedStack | None = None) -> None:
+        self.stack, self.said = stack or PlayedStack(), list[str]()
 
         def path(start: tuple[float, float, float]) -> Path:
             return setpoint(start, start)

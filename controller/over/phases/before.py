@@ -36,6 +36,7 @@ def connect(flight: Flight, now: float) -> None:
     """Wait for a HEARTBEAT of an autopilot."""
     flight.missing = "a HEARTBEAT of an autopilot; start the stack, and let it send to this address"
     if flight.telemetry.system is not None:
+        flight.dialect = dialects.dialect_of(flight.telemetry.autopilot, flight.dialect)
         flight.say(f"{flight.dialect.name} is there (system {flight.telemetry.system})")
         flight.go(State.PREPARING, now)
 
@@ -48,13 +49,19 @@ def prepare(flight: Flight, now: float) -> None:
             flight.pack(dialects.message_interval(flight.system, message_id, rate))
         for message_id in ASKED_FOR:
             flight.pack(dialects.request_message(flight.system, message_id))
-        for name in (flight.dialect.thrust_parameter, flight.dialect.patience_parameter):
+        dialect = flight.dialect
+        options = None if dialect.options is None else dialect.options[0]
+        for name in (dialect.thrust_parameter, dialect.patience_parameter, options):
             if name is not None:
                 message = mavlink.MAVLink_param_request_read_message(flight.system, 1, name.encode(), -1)
                 flight.pack(message)
     t.acks.clear()
     flight.missing = _missing(flight, now)
     if flight.missing:
+        return
+    wrong = _wrong_options(flight)
+    if wrong is not None:
+        flight.fail(wrong, now)
         return
     patience = t.parameters.get(flight.dialect.patience_parameter or "", 0.0)
     if patience > LONGEST_PATIENCE:
@@ -74,10 +81,24 @@ def _missing(flight: Flight, now: float) -> str:
         wanted.append("the stack's ODOMETRY, or LOCAL_POSITION_NED and ATTITUDE_QUATERNION")
     if t.altitude_msl is None or t.home_altitude is None:
         wanted.append("the stack's GLOBAL_POSITION_INT")
+    options = flight.dialect.options
+    if options is not None and options[0] not in t.parameters:
+        wanted.append(f"the stack's parameter {options[0]}")
     source = flight.source.missing(t, now, hanging=False)
     if source is not None:
         wanted.append(source)
     return ", ".join(wanted)
+
+
+def _wrong_options(flight: Flight) -> str | None:
+    """Why the stack would misunderstand set-points; None: it does not."""
+    if flight.dialect.options is None:
+        return None
+    name, bits, meaning = flight.dialect.options
+    value = int(flight.telemetry.parameters[name])
+    if value & bits == bits:
+        return None
+    return f"{name} is {value}: the {meaning}; expected {value | bits}"
 
 
 def arm(flight: Flight, now: float) -> None:

@@ -48,6 +48,9 @@ def stream(flight: Flight, now: float) -> None:
     if flight.ramp_time is None:
         flight.ramp_time = _plan(flight, estimate)
         flight.since = now
+    if flight.in_mode(flight.dialect.offboard):  # ArduCopter takes off in it: set-points act at once
+        flight.go(State.TAKING_OVER, now)
+        return
     flight.send(flight.hover_setpoint())
     if now - flight.since > STREAM_TIME:
         flight.go(State.TAKING_OVER, now)
