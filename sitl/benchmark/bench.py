@@ -18,6 +18,7 @@ from controller.hil.answers import AnswerWriter
 from controller.law.reference import setpoint
 from controller.pilot.autopilot import Autopilot
 from sitl.benchmark.ground import ground_figures
+from sitl.benchmark.gym import gym_figures
 from sitl.benchmark.roundtrip import round_trip_us
 from sitl.command_line.arguments import DEFAULT_RATE_HZ
 from sitl.flights.free_ports import free_ports
@@ -181,6 +182,7 @@ def bench(repeats: int) -> dict[str, float]:
             measured["lockstep_tick_us_estimate"] / measured["lockstep_tick_us"]
         )
         measured |= ground_figures(DEFAULT_RATE_HZ)
+        measured |= gym_figures()
         measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
         for key, value in measured.items():
             samples.setdefault(key, []).append(value)

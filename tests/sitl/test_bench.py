@@ -13,6 +13,7 @@ import pytest
 from controller.estimator.filter import Estimator
 from sitl.benchmark import bench
 from sitl.benchmark import ground as ground_bench
+from sitl.benchmark import gym as gym_bench
 from sitl_bridge.vehicle.files import load_vehicle
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "benchmark.md"
@@ -34,6 +35,7 @@ def instantly(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     end: dict[str, Any] = {"real_time_factor": 2.0, "lateness_us": {"p99": 2.0}, "late_ticks": 2}
     monkeypatch.setattr(bench, "lockstep_flight", lambda *arguments, **options: end)
     monkeypatch.setattr(ground_bench, "_flight", lambda *arguments: end)
+    monkeypatch.setattr(gym_bench, "STEPS", 2)
     return
 
 
