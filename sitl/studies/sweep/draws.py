@@ -41,10 +41,15 @@ def _identity(study: Study, inputs: dict[str, Any]) -> str:
         "scenario": study.scenario,
         "set": study.set,
         "duration": study.duration,
+        **({"of_own": changes} if (changes := _changes(study)) else {}),
         "random_vehicles": None if study.random_vehicles is None else study.random_vehicles.model_dump(),
     }
     text = json.dumps([fixed, inputs], sort_keys=True, default=list)
     return hashlib.sha256(text.encode()).hexdigest()[:24]
+
+
+def _changes(study: Study) -> dict[str, str]:
+    return {vary.key: vary.of_own for vary in study.vary if vary.of_own is not None}
 
 
 def _points(study: Study) -> list[dict[str, Any]]:

@@ -29,6 +29,12 @@ class Vary(Section):
     high: float | None = quantity("-", "of a range or distribution", None)
     steps: int = quantity("-", "values of a range in a grid", 5, ge=1, le=10_000)
     scale: Literal["linear", "log"] = quantity("-", "how a range is divided", "linear")
+    of_own: Literal["times", "plus"] | None = quantity(
+        "-",
+        "the drawn number times, or plus, the vehicle's own value; a list's `*` stands for each entry "
+        "(plant.rotors.*.time_constant)",
+        None,
+    )
     mean: float | None = quantity("-", "of a normal distribution", None)
     std: float | None = quantity("-", "of a normal distribution", None, gt=0)
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from sitl.api import Flight, fly
 from sitl.flights.outcome import FELL
-from sitl.flights.scenario import Scenario, load_scenario
+from sitl.flights.scenario import Scenario, load_scenario, scenario_vehicle
 from sitl.studies.random_vehicles import random_vehicle
+from sitl.studies.sweep.own_values import of_own
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 
@@ -38,11 +39,20 @@ def fly_draw(study: dict[str, Any], draw: dict[str, Any], logs: str | None) -> d
 
 
 def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Flight:
-    overrides, plant_overrides = list(study["set"]), []
+    overrides: list[str] = list(study["set"])
+    plant_overrides: list[str] = []
     scenario = load_scenario(study["scenario"])
+    vehicle = _vehicle(study, draw)
+    changes = {vary["key"]: vary["of_own"] for vary in study["vary"] if vary["of_own"] is not None}
     for key, value in draw.items():
-        if key.startswith("plant."):
-            plant_overrides.append(f"{key.removeprefix('plant.')}={_toml(value)}")
+        bare = key.removeprefix("plant.")
+        if key in changes:
+            told = scenario_vehicle(scenario, vehicle, overrides)
+            changed = of_own(told.model_dump(), bare, float(value), changes[key])
+            texts = [f"{name}={_toml(number)}" for name, number in changed.items()]
+            (plant_overrides if key.startswith("plant.") else overrides).extend(texts)
+        elif key.startswith("plant."):
+            plant_overrides.append(f"{bare}={_toml(value)}")
         elif key.startswith("reference."):
             scenario = with_reference(scenario, key.removeprefix("reference."), value)
         elif key not in (*OWN_KEYS, "random_vehicle"):
@@ -50,7 +60,7 @@ def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Fligh
     duration = draw.get("duration", study["duration"])
     return fly(
         scenario,
-        vehicle=_vehicle(study, draw),
+        vehicle=vehicle,
         overrides=overrides,
         plant_overrides=plant_overrides,
         seed=int(draw["seed"]),
