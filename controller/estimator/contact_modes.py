@@ -10,6 +10,7 @@ from typing import Any
 
 from controller.estimator.correct.sensors import failed, measured_pull, saturated
 from controller.estimator.correct.update import set_part
+from controller.estimator.predict.forces import cable
 from controller.estimator.records import (
     ACCELEROMETER,
     ATTITUDE,
@@ -64,6 +65,8 @@ DOUBT = 0.1
 """Of the cable's length: how far a load may be from where it is thought, when forces do not fit."""
 DOUBTED_SPEED = 0.5
 """m/s, likewise"""
+USUAL_SWING = 0.12
+"""rad, of a load's swing when what holds the vehicle lets go of it."""
 STRETCH_STD = 0.02
 """Of the cable's length: how well a pull shows how long the cable is."""
 
@@ -228,6 +231,22 @@ def leave_ground(f: Filter) -> None:
     for part in (LOAD, LOAD_VELOCITY):
         for i in range(part, part + 3):
             f.P[i, i] += f.p.initial_std[i] ** 2
+    doubt_swing(f)
+
+
+@kernel
+def doubt_swing(f: Filter) -> None:
+    """A load that hangs on a taut cable may swing: its velocity across the cable is not known."""
+    p, x = f.p, f.x
+    cable(f, f.vectors[0])
+    if f.m.tension <= 0.0:
+        return
+    square = x[X_LOAD] ** 2 + x[X_LOAD + 1] ** 2 + x[X_LOAD + 2] ** 2
+    variance = USUAL_SWING**2 * p.gravity * math.sqrt(square)
+    for i in range(3):
+        f.P[LOAD_VELOCITY + i, LOAD_VELOCITY + i] += variance
+        for j in range(3):
+            f.P[LOAD_VELOCITY + i, LOAD_VELOCITY + j] -= variance * x[X_LOAD + i] * x[X_LOAD + j] / square
 
 
 @kernel
