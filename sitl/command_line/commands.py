@@ -198,8 +198,9 @@ def _fly(arguments: argparse.Namespace) -> int:
     from controller.ground.link.ports import STATION_LOCAL
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
-    from sitl.flights.report import table, written
+    from sitl.flights.report import written
     from sitl.flights.scenario import GroundControl, load_scenario
+    from sitl.terminal.summary import table
     from sitl_bridge.mavlink.links import Address
 
     if arguments.over is not None:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from controller.feedback.truth import estimates
-from sitl.flights.display import Display
 from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, watch
 from sitl.flights.refusals import check_feasible
@@ -25,7 +24,8 @@ from sitl.flights.scenario import (
     suited,
     usual_feedback,
 )
-from sitl.flights.status import Status, status_of
+from sitl.terminal.display import Display
+from sitl.terminal.status import Status, status_of
 from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from sitl.flights.display import Display
 from sitl.flights.flight import FlightOptions
 from sitl.flights.launch import Pair, watch
 from sitl.flights.report import clear
-from sitl.flights.status import status_of
+from sitl.terminal.display import Display
+from sitl.terminal.status import status_of
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import DescriptionError
 

@@ -11,16 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from controller.over.stack import read_stack
-from sitl.flights.display import Display
 from sitl.flights.flight import new_folder
 from sitl.flights.free_ports import free_ports
 from sitl.flights.keep import keep_recording
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import OF_THE_PLANT, clear, positions, read_state_log, row, write_report
+from sitl.flights.report import OF_THE_PLANT, clear, positions, read_state_log, write_report
 from sitl.flights.scenario import GroundControl, Scenario, scenario_vehicle, suited
-from sitl.flights.status import Status, status_of
 from sitl.over.processes import Account, Children
 from sitl.over.window import cut_log, step_figures
+from sitl.terminal.display import Display
+from sitl.terminal.status import Status, status_of
+from sitl.terminal.summary import row
 from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.log.state_log import FILE_NAME
 from sitl_bridge.process import StopRequest

@@ -13,7 +13,7 @@ import pytest
 import sitl
 from sitl.flights.free_ports import free_ports
 from sitl.flights.outcome import FELL, judge
-from sitl.flights.report import IN_WORDS
+from sitl.terminal.summary import IN_WORDS
 from sitl_bridge.plant.lost_vehicle import GRACE
 from sitl_bridge.vehicle.files import load_vehicle
 

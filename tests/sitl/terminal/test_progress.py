@@ -19,10 +19,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from sitl.flights.display import Display, live_table
 from sitl.flights.free_ports import free_ports
-from sitl.flights.report import table
-from sitl.flights.status import Status, cells, plain_text
+from sitl.terminal.display import Display, live_table
+from sitl.terminal.status import Status, cells, plain_text
+from sitl.terminal.summary import table
 
 FLYING = Status(12.34, (3.0, -5.123, 2.0), 0.0123, 98.1, "setpoint", 1.0)
 statuses = st.builds(

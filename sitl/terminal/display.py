@@ -9,7 +9,7 @@ import time
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
-from sitl.flights.status import WIDE, Status, cells, plain_text, what_happened
+from sitl.terminal.status import WIDE, Status, cells, plain_text, what_happened
 
 if TYPE_CHECKING:
     from rich.console import Console
