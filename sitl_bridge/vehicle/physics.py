@@ -25,8 +25,8 @@ LONGEST_REACTION = 100.0
 """m: torque over thrust of a rotor. The paper's is 5 m, a real propeller's some hundredths."""
 MOST_STRETCH = 100.0
 """Rest lengths by which the load's weight may stretch the cable; the paper's softest is 5."""
-FASTEST_CABLE = 25e3
-"""1/s: a faster cable is integrated in steps below 10 microseconds."""
+FASTEST_MODE = 25e3
+"""1/s: a faster cable or ground contact is integrated in steps below 10 microseconds."""
 FASTEST_DRAG = 1e3
 """1/s: drag that stops a body faster is not resolved by the integration's longest step, 1 ms."""
 LONGEST_START = 2.0
@@ -157,9 +157,9 @@ def _cable_rate(vehicle: Vehicle) -> Found:
     lighter, heavier = sorted((vehicle.airframe.mass, vehicle.load.mass))
     reduced = lighter / (1.0 + lighter / heavier)
     rate = mode_rate(cable.stiffness / reduced, cable.damping / reduced)
-    if rate <= FASTEST_CABLE:
+    if rate <= FASTEST_MODE:
         return
-    stiffest, most_damped = FASTEST_CABLE**2 * reduced, FASTEST_CABLE * reduced
+    stiffest, most_damped = FASTEST_MODE**2 * reduced, FASTEST_MODE * reduced
     if cable.stiffness > stiffest:
         key, value, limit, unit = "stiffness", cable.stiffness, stiffest, "N/m"
     else:
@@ -214,6 +214,26 @@ def _legs(vehicle: Vehicle) -> Found:
             "airframe.legs: all on one side of the centre of mass, the vehicle falls over; "
             "expected legs on all sides",
         )
+
+
+def _turning_on_legs(vehicle: Vehicle) -> Found:
+    """On legs that reach far a body of little inertia turns faster than can be simulated."""
+    ground, airframe = vehicle.ground, vehicle.airframe
+    if ground is None or not airframe.legs or next(_inertia(vehicle), None) is not None:
+        return
+    heave = vehicle.gravity / ground.sink
+    ratio = 2.0 * ground.damping_ratio / math.sqrt(heave)  # damping over stiffness, s
+    for axis, moment in enumerate(airframe.inertia):
+        squares = [sum(part * part for i, part in enumerate(leg) if i != axis) for leg in airframe.legs]
+        square = heave * airframe.mass * sum(squares) / len(squares) / moment
+        rate = mode_rate(square, square * ratio)
+        if rate > FASTEST_MODE:
+            yield _fault(
+                "airframe.legs",
+                f"airframe.legs: up to {math.sqrt(max(squares)):.3g} m from an axis of {moment:g} kg m², the "
+                f"vehicle turns on them at {rate:.2g} 1/s, too fast to simulate; expected shorter legs",
+            )
+            return
 
 
 def _ground(vehicle: Vehicle) -> Found:
@@ -287,6 +307,7 @@ CHECKS: dict[Callable[[Vehicle], Found], tuple[str, ...]] = {
     _drag: ("airframe",),
     _drag_of_load: ("load",),
     _legs: ("airframe", "ground"),
+    _turning_on_legs: ("airframe", "ground", "gravity"),
     _ground: ("airframe", "cable", "load", "gravity", "ground", "initial"),
     _start: ("airframe", "cable", "load", "gravity", "ground", "initial", "rotors"),
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import datetime
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from sitl.flights.scenario import Scenario
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.physics.parameters import parameters, step_count
+from sitl_bridge.vehicle import files
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.errors import DescriptionError
 from sitl_bridge.vehicle.files import load_vehicle, read_toml, validated, vehicle_names
@@ -134,3 +136,36 @@ def test_an_override_that_is_too_deep_or_too_large_is_refused(text: str) -> None
     with pytest.raises(DescriptionError) as caught:
         load_vehicle("iris", [text])
     assert len(caught.value.faults) == 1
+
+
+TEXTS = {
+    name: (Path(files.__file__).parents[1] / f"vehicles/{name}.toml").read_text(encoding="utf-8")
+    for name in vehicle_names()
+}
+
+
+@given(
+    st.sampled_from(sorted(TEXTS)),
+    st.lists(
+        st.tuples(st.integers(0, 10**6), st.sampled_from(["drop", "double", "insert"]), st.text(max_size=6))
+    ),
+)
+@settings(max_examples=100, deadline=None)
+def test_any_edit_of_a_file_loads_or_is_refused_in_lines(
+    tmp_path_factory: pytest.TempPathFactory, name: str, edits: list[tuple[int, str, str]]
+) -> None:
+    """Lines dropped or doubled, characters inserted: also what is no TOML, and lines that are not there."""
+    lines = TEXTS[name].split("\n")
+    for where, kind, text in edits:
+        number = where % len(lines)
+        if kind == "insert":
+            column = where % (len(lines[number]) + 1)
+            lines[number] = lines[number][:column] + text + lines[number][column:]
+        else:
+            lines[number : number + 1] = [lines[number]] * (2 if kind == "double" else 0) or [""]
+    file = tmp_path_factory.mktemp("edited") / "mine.toml"
+    file.write_bytes("\n".join(lines).encode("utf-8", "surrogatepass"))
+    try:
+        load_vehicle(str(file))
+    except DescriptionError as error:
+        refused_in_lines(error)

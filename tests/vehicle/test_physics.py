@@ -30,6 +30,7 @@ def faults(*overrides: str, source: str = "iris") -> list[str]:
         (["cable.damping=1e5"], "cable.damping = 100000 N s/m: vehicle and load move"),
         (["load.drag.quadratic=1000"], "load.drag.quadratic = 1000 N s²/m²: stops 0.3 kg within"),
         (["airframe.legs=[[1,0,-1],[1,1,-1],[1,-1,-1]]"], "airframe.legs: all on one side"),
+        (["airframe.legs=[[99,0,-0.1],[-9,9,-0.1],[-9,-9,-0.1]]"], "the vehicle turns on them at"),
         (["airframe.legs=[[1,0,1],[-1,1,1],[-1,-1,1]]"], "airframe.legs: none is below"),
         ([HOVER, "initial.load_position=[0,0,0.01]"], "initial.load_position.2 = 0.01 m: 0.04 m of it"),
         ([HOVER, "initial.vehicle_position=[1,0,0.06]"], "initial.vehicle_position.2 = 0.06 m"),

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import model_validator
 
-from sitl_bridge.vehicle.files import DescriptionError, validated
+from sitl_bridge.vehicle.files import DescriptionError, beside, validated
 from sitl_bridge.vehicle.schema import Section, quantity
 
 Value = str | float | int | bool | tuple[float, ...]
@@ -125,7 +125,13 @@ def load_study(file: Path) -> Study:
     except ValueError as error:
         raise DescriptionError(str(file), [f"not valid TOML: {error}"]) from None
     study = validated(Study, content, str(file))
-    scenario = file.parent / study.scenario
-    if scenario.suffix == ".toml" and scenario.exists():
-        study = study.model_copy(update={"scenario": str(scenario)})
-    return study
+    vary = tuple(_vehicles_beside(entry, str(file)) for entry in study.vary)
+    return study.model_copy(update={"scenario": beside(study.scenario, str(file)), "vary": vary})
+
+
+def _vehicles_beside(vary: Vary, file: str) -> Vary:
+    """What varies, the paths of vehicles relative to the study's file."""
+    if vary.key != "vehicle" or vary.values is None:
+        return vary
+    values = tuple(beside(value, file) if isinstance(value, str) else value for value in vary.values)
+    return vary.model_copy(update={"values": values})

@@ -135,6 +135,15 @@ def test_a_wrong_study_is_one_line_for_each_fault(tmp_path: Path, text: str, say
         load_study(file)
 
 
+def test_paths_in_a_study_are_relative_to_it(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    vary = '[[vary]]\nkey = "vehicle"\nvalues = ["iris", "v.toml"]\n'
+    file.write_text('name = "x"\nscenario = "s.toml"\n' + vary)
+    study = load_study(file)
+    assert study.scenario == str(tmp_path / "s.toml")
+    assert study.vary[0].values == ("iris", str(tmp_path / "v.toml"))
+
+
 @pytest.mark.parametrize("file", sorted(STUDIES.glob("*.toml")), ids=lambda file: file.stem)
 def test_shipped_studies_are_valid(file: Path) -> None:
     assert draws(load_study(file))
