@@ -9,6 +9,11 @@ COMPONENT_LOAD = 35  # ArduPilot's precedent for a simulated slung payload
 ACTUATOR_CONTROLS = 16
 """Controls in HIL_ACTUATOR_CONTROLS: the most rotors that a vehicle can have."""
 
+# Actuator controls after the rotors', where a vehicle has a gripper or a winch; see docs/plant.md.
+GRIPPER_CONTROL, WINCH_CONTROL, CLUTCH_CONTROL = 0, 1, 2
+"""Which of the controls that follow the last rotor's each is."""
+HOIST_CONTROLS = 3
+
 HIL_UDP_PORT = 14560
 HIL_TCP_PORT = 4560
 

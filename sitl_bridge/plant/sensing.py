@@ -98,7 +98,7 @@ class Sensing:
 
     def _say_slowly(self) -> None:
         self._slow_frames = self._slow.frames(
-            self._tick, self._time_usec, self._world.state, self._power, self._sighting
+            self._tick, self._time_usec, self._world.state, self._power, self._sighting, self._world.reel
         )
 
     def _write_datagram(self) -> None:

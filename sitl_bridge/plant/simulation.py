@@ -107,7 +107,12 @@ class Simulation:
         """Reads what the autopilot says."""
         self._writer = TickWriter(instance, self.origin, self.world)
         slow = SlowFrames(
-            LoadOnMap(self.origin), self._writer.load, self._writer.vehicle, vehicle.battery, rate_hz
+            LoadOnMap(self.origin),
+            self._writer.load,
+            self._writer.vehicle,
+            vehicle.battery,
+            vehicle.winch,
+            rate_hz,
         )
         self._sensing = Sensing(self.world, self._writer, slow, self._inject_again)
         self._power = self.world.battery(0.0)

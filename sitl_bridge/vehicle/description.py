@@ -59,6 +59,35 @@ class Cable(Section):
     )
 
 
+class Gripper(Section):
+    """A hook at the cable's end that lets the load go, and takes it up again."""
+
+    reach: float = quantity("m", "from hook to load, up to which it is taken", 0.3, gt=0, le=10)
+    release_time: float = quantity("s", "from the command until the load is free", 0.2, ge=0, le=10)
+
+
+class Winch(Section):
+    """A drum at the vehicle that changes the cable's rest length, driven by a motor with a brake.
+
+    A cable whose described rest length is outside the range widens it.
+    """
+
+    min_length: float = quantity("m", "rest length of the cable, reeled in", gt=0, le=1e3)
+    max_length: float = quantity("m", "rest length of the cable, paid out", gt=0, le=1e3)
+    rate: float = quantity("m/s", "largest rate of the rest length", gt=0, le=20)
+    time_constant: float = quantity("s", "first-order lag of the motor's speed", 0.1, ge=1e-3, le=10)
+    stall_tension: float = quantity("N", "more than this, and it cannot reel in", gt=0, le=1e6)
+
+    @model_validator(mode="after")
+    def _has_a_range(self) -> Winch:
+        if self.min_length >= self.max_length:
+            raise ValueError(
+                f"min_length = {self.min_length:g} m is not below max_length = {self.max_length:g} m; "
+                "expected a range of lengths"
+            )
+        return self
+
+
 class Load(Section):
     mass: float = quantity("kg", "m_p", gt=0, le=1e4)
     radius: float = quantity("m", "height of its centre above the ground that it lies on", 0.0, ge=0, le=10)
@@ -178,6 +207,8 @@ class Vehicle(Section):
     )
     cable: Cable
     load: Load
+    gripper: Gripper | None = None
+    winch: Winch | None = None
     initial: Initial = Initial()
     disturbance: Disturbance = Disturbance()
     ground: Ground | None = None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from sitl_bridge.ids import ACTUATOR_CONTROLS, HOIST_CONTROLS
 from sitl_bridge.vehicle.rotors import full_thrust, rotor_effect
 
 if TYPE_CHECKING:
@@ -132,6 +133,18 @@ def _steering(vehicle: Vehicle) -> Found:
             "rotors",
             f"rotors: thrust without moments leaves nothing to {', '.join(idle)}; "
             "expected hubs on all sides, and as much cw as ccw",
+        )
+
+
+def _hoist(vehicle: Vehicle) -> Found:
+    if vehicle.gripper is None and vehicle.winch is None:
+        return
+    most = ACTUATOR_CONTROLS - HOIST_CONTROLS
+    if len(vehicle.rotors) > most:
+        yield _fault(
+            "rotors",
+            f"rotors: {len(vehicle.rotors)} leave no actuator controls to gripper and winch; "
+            f"expected up to {most}",
         )
 
 
@@ -302,6 +315,7 @@ CHECKS: dict[Callable[[Vehicle], Found], tuple[str, ...]] = {
     _inertia: ("airframe",),
     _thrust: ("airframe", "load", "rotors", "gravity"),
     _steering: ("rotors",),
+    _hoist: ("gripper", "rotors", "winch"),
     _cable: ("cable", "load", "gravity"),
     _cable_rate: ("cable", "load", "airframe"),
     _drag: ("airframe",),

@@ -21,8 +21,8 @@ from sitl_bridge.plant.physics.state import CABLE_HOLDS, Array
 
 @kernel
 def spring_and_damper(p: Any, length: Any, rate: Any) -> Any:
-    """F = k_a (l - l_0) + c_a dl/dt in N, whatever its sign; length: l in m; rate: dl/dt in m/s."""
-    return p.stiffness * (length - p.rest_length) + p.damping * rate
+    """F = k_a (l - l_0) + c_a d(l - l_0)/dt in N, whatever its sign; length: l in m; rate: dl/dt in m/s."""
+    return p.stiffness * (length - p.rest_length) + p.damping * (rate - p.reel_rate)
 
 
 @kernel

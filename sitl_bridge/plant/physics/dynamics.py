@@ -26,6 +26,7 @@ from sitl_bridge.plant.physics.cable import (
     tension_of,
 )
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle, move_anchors
+from sitl_bridge.plant.physics.hoist import begin_reeling, end_reeling, take_hoist_commands, work_gripper
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.rotors import rotor_decay, rotor_wrench, spin_up
 from sitl_bridge.plant.physics.state import (
@@ -342,7 +343,12 @@ def advance(
     force_row, force_age = first_force // force_hold, first_force % force_hold
     wind_row, wind_age = first_wind // wind_hold, first_wind % wind_hold
     for _ in range(steps):
+        if p.has_hoist:
+            begin_reeling(p, x, inner, step)
         whole_step(p, x, inner, command, forces[force_row], winds[wind_row], step, work)
+        if p.has_hoist:
+            end_reeling(p, step)
+            work_gripper(p, x, inner, step)
         force_age, wind_age = force_age + 1, wind_age + 1
         if force_age == force_hold:
             force_row, force_age = force_row + 1, 0
@@ -373,10 +379,14 @@ def derivative(p: Any, x: Array, rotor_speed: Array, force: Array, out: Array) -
 def set_rotors(record: Any, controls: Array, speed_share: Array, rotor_speed: Array) -> int:
     """Commanded rotor speeds (n,), rad/s, from controls of 0..1; what is not finite means stopped.
 
+    Controls after the rotors' are for gripper and winch, see `hoist`.
+
     speed_share: what each rotor gives of its commanded speed, 1 for a sound one.
     """
     for i in range(MOST_ROTORS):
         control = controls[i]
         within = min(max(control, 0.0), 1.0) if math.isfinite(control) else 0.0
         rotor_speed[i] = within * record[0].max_speed[i] * speed_share[i]
+    if record[0].has_hoist:
+        take_hoist_commands(record[0], controls)
     return 0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.plant.physics.ground import contact, leg_reach
+from sitl_bridge.plant.physics.hoist import HOIST, hoist
 from sitl_bridge.plant.physics.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.physics import mode_rate
@@ -20,12 +21,15 @@ PARAMETERS = np.dtype(
         ("load_mass", "f8"),
         ("stiffness", "f8"),
         ("damping", "f8"),
-        ("rest_length", "f8"),
+        ("rest_length", "f8"),  # as it is now: a winch changes it
+        ("reel_rate", "f8"),  # m/s, at which the rest length changes
         ("breaking_tension", "f8"),
         ("two_way", "b1"),
         ("has_lag", "b1"),
         ("has_drag", "b1"),
         ("has_ground", "b1"),
+        ("has_hoist", "b1"),
+        ("hoist", HOIST),
         ("rotor_count", "i8"),
         ("rotor_x", "f8", MOST_ROTORS),
         ("rotor_y", "f8", MOST_ROTORS),
@@ -74,6 +78,8 @@ def parameters(vehicle: Vehicle) -> Parameters:
     p["damping"] = vehicle.cable.damping
     p["rest_length"] = vehicle.cable.rest_length
     p["breaking_tension"] = vehicle.cable.breaking_tension or math.inf
+    p["has_hoist"] = vehicle.gripper is not None or vehicle.winch is not None
+    p["hoist"] = hoist(vehicle)
     p["two_way"] = vehicle.cable.model == "two-way"
     p["rotor_count"] = len(vehicle.rotors)
     for index, rotor in enumerate(vehicle.rotors):

@@ -20,6 +20,7 @@ from sitl_bridge.plant.physics.battery import (
 from sitl_bridge.plant.physics.cable import tension_of
 from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.physics.dynamics import advance, set_rotors
+from sitl_bridge.plant.physics.hoist import Reel, hoist
 from sitl_bridge.plant.physics.parameters import parameters, step_count
 from sitl_bridge.plant.physics.record import WORLD
 from sitl_bridge.plant.physics.state import (
@@ -118,6 +119,8 @@ class World:
         battery = self.vehicle.battery
         self._charge = battery.charge if battery is not None else 1.0
         self._speed_share[:] = 1.0
+        self._parameters["rest_length"], self._parameters["reel_rate"] = self.vehicle.cable.rest_length, 0.0
+        self._parameters["hoist"] = hoist(self.vehicle)
         self.set_load_mass(None)
         self.command(self.initial_controls)
 
@@ -198,6 +201,16 @@ class World:
     def cable_tension(self) -> float:
         """The cable's tension, N."""
         return tension_of(self._parameters.view(np.recarray)[0], self.state, self.inner)
+
+    def reel(self) -> Reel:
+        """The winch as it is now."""
+        p = self._parameters[0]
+        return Reel(
+            float(p["rest_length"]),
+            float(p["reel_rate"]),
+            self.cable_tension(),
+            bool(p["hoist"]["clutch_open"]),
+        )
 
     def set_load_mass(self, mass: float | None) -> None:
         """Change the load's mass, kg; None: as described."""

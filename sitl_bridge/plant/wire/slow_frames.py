@@ -7,6 +7,7 @@ and GLOBAL_POSITION_INT. Ground stations that draw only aircraft with an autopil
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import common
@@ -27,13 +28,15 @@ from sitl_bridge.mavlink.fields import NOT_KNOWN_INT16, NOT_KNOWN_UINT16, pack_v
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
 from sitl_bridge.plant.physics.battery import BatteryReading
+from sitl_bridge.plant.physics.hoist import Reel
 from sitl_bridge.plant.physics.state import LOAD_POSITION, LOAD_VELOCITY, Array
 from sitl_bridge.plant.sensors.tracker import Sighting
-from sitl_bridge.vehicle.description import Battery
+from sitl_bridge.vehicle.description import Battery, Winch
 
 HEARTBEAT_INTERVAL = 1.0
 POSITION_INTERVAL = 0.2
 BATTERY_INTERVAL = 0.5
+WINCH_INTERVAL = 0.05
 
 
 def load_heartbeat() -> Any:
@@ -89,6 +92,27 @@ def battery_status(battery: Battery, now: BatteryReading) -> Any:
     )
 
 
+def winch_status(time_usec: int, reel: Reel, winch: Winch) -> Any:
+    """WINCH_STATUS: rest length, rate and tension of the cable; nothing is known of the motor's supply."""
+    status = common.MAV_WINCH_STATUS_HEALTHY
+    if reel.length <= winch.min_length:
+        status |= common.MAV_WINCH_STATUS_FULLY_RETRACTED
+    if reel.rate != 0.0:
+        status |= common.MAV_WINCH_STATUS_MOVING
+    if not reel.free:
+        status |= common.MAV_WINCH_STATUS_CLUTCH_ENGAGED
+    return common.MAVLink_winch_status_message(
+        time_usec=time_usec,
+        line_length=reel.length,
+        speed=reel.rate,
+        tension=reel.tension,
+        voltage=math.nan,
+        current=math.nan,
+        temperature=NOT_KNOWN_INT16,
+        status=status,
+    )
+
+
 def landing_target(time_usec: int, seen: Sighting) -> Any:
     """LANDING_TARGET of the tracker: where the load is from the vehicle, m, BODY_FRD, at its exposure.
 
@@ -118,24 +142,38 @@ class SlowFrames:
     """Decides what is due at a tick; each tick is asked for once, in turn."""
 
     def __init__(
-        self, load_map: LoadOnMap, load: Packer, vehicle: Packer, battery: Battery | None, rate_hz: float
+        self,
+        load_map: LoadOnMap,
+        load: Packer,
+        vehicle: Packer,
+        battery: Battery | None,
+        winch: Winch | None,
+        rate_hz: float,
     ) -> None:
         """load, vehicle: pack frames of the load's and the vehicle's system."""
         self._map = load_map
         self._load, self._vehicle = load, vehicle
-        self._battery = battery
-        self._heartbeat_every, self._position_every, self._battery_every = (
+        self._battery, self._winch = battery, winch
+        self._heartbeat_every, self._position_every, self._battery_every, self._winch_every = (
             max(1, round(interval * rate_hz))
-            for interval in (HEARTBEAT_INTERVAL, POSITION_INTERVAL, BATTERY_INTERVAL)
+            for interval in (HEARTBEAT_INTERVAL, POSITION_INTERVAL, BATTERY_INTERVAL, WINCH_INTERVAL)
         )
 
     def ticks_left(self, tick: int) -> int:
         """How many ticks after `tick` nothing is due (but sightings)."""
-        intervals = (self._heartbeat_every, self._position_every, self._battery_every)
+        intervals = [self._heartbeat_every, self._position_every, self._battery_every]
+        if self._winch is not None:
+            intervals.append(self._winch_every)
         return min(every - 1 - tick % every for every in intervals)
 
     def frames(
-        self, tick: int, time_usec: int, x: Array, power: BatteryReading | None, seen: Sighting | None
+        self,
+        tick: int,
+        time_usec: int,
+        x: Array,
+        power: BatteryReading | None,
+        seen: Sighting | None,
+        reel: Callable[[], Reel],
     ) -> bytes:
         """All that is due, one behind the other."""
         out = b""
@@ -145,6 +183,8 @@ class SlowFrames:
             out += self._load.pack(self._map.global_position(time_usec, x))
         if power is not None and self._battery is not None and tick % self._battery_every == 0:
             out += self._vehicle.pack(battery_status(self._battery, power))
+        if self._winch is not None and tick % self._winch_every == 0:
+            out += self._vehicle.pack(winch_status(time_usec, reel(), self._winch))
         if seen is not None:
             out += self._vehicle.pack(landing_target(time_usec, seen))
         return out
