@@ -16,6 +16,7 @@ from controller.pilot.stall_clock import AwakeClock
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.lossy_link import LossyLink
 from sitl_bridge.process import Speaker, StopRequest
+from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
@@ -81,8 +82,10 @@ def open_session(
 ) -> tuple[HilSession, EstimateLog | None, Guided | None]:
     """The autopilot's side of the HIL link without the link, its log, and what ground control needs of it.
 
-    The caller closes what is not None.
+    The caller closes what is not None. Whatever the cable is, the controller takes it for the linear one that
+    it acts as about hover.
     """
+    options = replace(options, vehicle=linearised(options.vehicle))
     log: EstimateLog | None = None
     feedback: Feedback | None = None
     design = options.design

@@ -25,6 +25,7 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     WRENCH_SIZE,
 )
+from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
 
 ANTI_WINDUP_TIME = 1.0
@@ -116,10 +117,13 @@ def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) 
 def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int, loaded: bool = True) -> Design:
     """The design that minimises a cost in the sampled loop of a vehicle: a record of shape (1,).
 
+    A cable that is no spring and damper is linearised about hover.
+
     weights: Q (18, 18), or (21, 21) with the integral of the load's position, and R (4, 4).
     entry: how the reference enters, see `law`. Not loaded: the vehicle alone, the integral being of its own
     position; the load's weights have no effect.
     """
+    vehicle = linearised(vehicle)
     period, delay = 1.0 / rate_hz, vehicle.loop.delay_ticks
     assert delay <= LONGEST_DELAY
     model = actuated_model(vehicle, loaded)

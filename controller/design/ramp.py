@@ -14,6 +14,7 @@ import numpy as np
 
 from controller.law.reference import SMOOTH_STEP, Path
 from controller.law.state import Array
+from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Drag, Vehicle
 from sitl_bridge.vehicle.rotors import rotor_effect
 
@@ -53,7 +54,7 @@ def planned(path: Path, vehicle: Vehicle) -> Path:
 
     The motion is feasible if the path itself is.
     """
-    out = path.copy()
+    out, vehicle = path.copy(), linearised(vehicle)
     if out["local"][0]:
         return out
     lag = max(rotor.time_constant for rotor in vehicle.rotors)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.rowlog import RowLog
+from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
 
 LONGEST_TURN = 0.02
@@ -164,6 +165,7 @@ class Log:
 
 def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
     """Fly once over a stack; returns what to report of it. Raises OSError when a link cannot be opened."""
+    options = replace(options, vehicle=linearised(options.vehicle))
     link = open_link(options.over, speaker.say, punctual=True)
     truth = None if options.truth is None else open_link(options.truth, speaker.say)
     sensor = None if options.load_link is None else open_link(options.load_link, speaker.say)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sitl.export.shapes import disc_diameter, load_radius
 from sitl.view.view import View
 from sitl_bridge.frames import Quaternion, Triple
+from sitl_bridge.vehicle.cable_law import linear_cable
 from sitl_bridge.vehicle.description import Vehicle
 
 Colour = tuple[int, int, int]
@@ -152,7 +153,7 @@ class Scene:
         return (round(255 * red), round(255 * green), round(255 * blue))
 
     def _spring_force(self, length: float) -> float:
-        cable = self._vehicle.cable
+        cable = linear_cable(self._vehicle)
         return cable.stiffness * (length - cable.rest_length)
 
     def _trail(self, body: str, at: Triple) -> None:

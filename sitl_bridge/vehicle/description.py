@@ -10,9 +10,11 @@ import math
 from typing import Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from sitl_bridge.ids import ACTUATOR_CONTROLS
+from sitl_bridge.vehicle.cable_law import cable_law
+from sitl_bridge.vehicle.cable_materials import MaterialName
 from sitl_bridge.vehicle.physics import PhysicsError, physics_faults
 from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
 from sitl_bridge.vehicle.schema import (
@@ -46,17 +48,47 @@ class Airframe(Section):
 
 
 class Cable(Section):
-    stiffness: float = quantity("N/m", "k_a of eq. 9", gt=0, le=1e6)
-    damping: float = quantity("N s/m", "c_a of eq. 9", 0.0, ge=0, le=1e5)
+    """The cable between vehicle and load: the paper's spring and damper, or a rope of some material."""
+
+    stiffness: float = quantity("N/m", "k_a of eq. 9; progressive: follows from the material", gt=0, le=1e6)
+    damping: float = quantity(
+        "N s/m", "c_a of eq. 9; progressive: follows from the loss factor", 0.0, ge=0, le=1e5
+    )
     rest_length: float = quantity("m", "l_0 of eq. 9", gt=0, le=1e3)
-    model: Literal["two-way", "tension-only"] = quantity(
+    model: Literal["two-way", "tension-only", "linear", "progressive"] = quantity(
         "-",
-        "two-way also pushes below its rest length (the paper's); tension-only never does",
+        "two-way also pushes below its rest length (the paper's); tension-only, or linear, never does; "
+        "progressive is a rope of `material`, see docs/cables.md",
         "tension-only",
+    )
+    material: MaterialName | None = quantity("-", "of a progressive cable; nylon unless told", None)
+    diameter: float | None = quantity(
+        "m",
+        "of a progressive cable; unless told, it follows from breaking_tension or the load",
+        None,
+        ge=1e-5,
+        le=0.5,
+    )
+    loss_factor: float | None = quantity(
+        "-",
+        "of a progressive cable: energy lost in a cycle over 2 pi times that stored; the material's",
+        None,
+        ge=1e-3,
+        le=0.3,
     )
     breaking_tension: float | None = quantity(
         "N", "more than this, and the cable breaks", None, gt=0, le=1e12
     )
+
+    @field_validator("model")
+    @classmethod
+    def _linear_is_tension_only(cls, model: str) -> str:
+        return "tension-only" if model == "linear" else model
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is a spring and damper."""
+        return self.model != "progressive"
 
 
 class Gripper(Section):
@@ -233,6 +265,9 @@ class Vehicle(Section):
     @property
     def hover_length(self) -> float:
         """Cable length at the hover equilibrium, m (eq. 17, corrected: l_0 + m_p g / k_a)."""
+        if not self.cable.is_linear:
+            strain = cable_law(self).strain(self.load.mass * self.gravity)
+            return self.cable.rest_length * (1.0 + strain)
         return self.cable.rest_length + self.load.mass * self.gravity / self.cable.stiffness
 
     @property

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sitl_bridge.ids import ACTUATOR_CONTROLS, HOIST_CONTROLS
+from sitl_bridge.vehicle.cable_law import cable_law, linear_cable
 from sitl_bridge.vehicle.rotors import full_thrust, rotor_effect
 
 if TYPE_CHECKING:
@@ -150,6 +151,9 @@ def _hoist(vehicle: Vehicle) -> Found:
 
 def _cable(vehicle: Vehicle) -> Found:
     cable, weight = vehicle.cable, vehicle.load.mass * vehicle.gravity
+    if not cable.is_linear:
+        yield from _rope(vehicle, weight)
+        return
     if cable.breaking_tension is not None and cable.breaking_tension <= weight:
         yield _fault(
             "cable.breaking_tension",
@@ -165,12 +169,33 @@ def _cable(vehicle: Vehicle) -> Found:
         )
 
 
+def _rope(vehicle: Vehicle, weight: float) -> Found:
+    """A progressive cable: it carries the load."""
+    cable, law = vehicle.cable, cable_law(vehicle)
+    bears = min(law.breaking_load, cable.breaking_tension or math.inf)
+    if bears <= weight:
+        key = "breaking_tension" if cable.diameter is None or bears < law.breaking_load else "diameter"
+        value = f"{cable.diameter:g} m" if key == "diameter" else f"{cable.breaking_tension:g} N"
+        yield _fault(
+            f"cable.{key}",
+            f"cable.{key} = {value}: the cable bears {bears:.4g} N and the load weighs {weight:.4g} N; "
+            "expected a stronger cable",
+        )
+
+
 def _cable_rate(vehicle: Vehicle) -> Found:
-    cable = vehicle.cable
+    cable = linear_cable(vehicle)
     lighter, heavier = sorted((vehicle.airframe.mass, vehicle.load.mass))
     reduced = lighter / (1.0 + lighter / heavier)
     rate = mode_rate(cable.stiffness / reduced, cable.damping / reduced)
     if rate <= FASTEST_MODE:
+        return
+    if not vehicle.cable.is_linear:
+        yield _fault(
+            "cable",
+            f"cable: vehicle and load move on it at {rate:.2g} 1/s, too fast to simulate; "
+            "expected a thinner or longer cable, or heavier bodies",
+        )
         return
     stiffest, most_damped = FASTEST_MODE**2 * reduced, FASTEST_MODE * reduced
     if cable.stiffness > stiffest:
@@ -279,7 +304,7 @@ def _ground(vehicle: Vehicle) -> Found:
 
 def _start(vehicle: Vehicle) -> Found:
     """The cable at the start: neither torn nor longer than it can be."""
-    initial, cable = vehicle.initial, vehicle.cable
+    initial, cable = vehicle.initial, linear_cable(vehicle)
     if initial.vehicle_position == initial.load_position:
         yield _fault(
             "initial.vehicle_position",

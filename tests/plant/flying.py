@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.physics.dynamics import TABLE_ROWS, WORK_ROWS, advance
+from sitl_bridge.plant.physics.dynamics import TABLE_ROWS, WORK_SHAPE, advance
 from sitl_bridge.plant.physics.parameters import parameters
 from sitl_bridge.plant.physics.state import (
     INNER_SIZE,
     LOAD_VELOCITY,
     MOST_ROTORS,
     REACTIONS_SIZE,
-    STATE_SIZE,
     VEHICLE_VELOCITY,
     initial_inner_state,
     initial_state,
@@ -50,7 +49,7 @@ class Flight:
             self.command,
             self.forces,
             self.winds,
-            np.zeros((WORK_ROWS, STATE_SIZE)),
+            np.zeros(WORK_SHAPE),
         )
         self._measure = measure.bind(
             self.record,
@@ -58,7 +57,7 @@ class Flight:
             self.inner,
             self.forces[0],
             self.winds[0],
-            np.zeros((WORK_ROWS, STATE_SIZE)),
+            np.zeros(WORK_SHAPE),
             np.zeros(3),
             self.reactions,
             np.zeros(1, dtype=MEASUREMENT),

@@ -8,7 +8,10 @@ Taut or slack is decided between steps and held within one: within a step the fo
 function of the state, and the sign of `taut_margin_of` says when the other one holds. Where the sign
 changes, the step is split at that instant, so that the integrator keeps its order through snatches.
 
-Arguments: p, parameter record; x, state (19,); inner, inner state (35,); see `state`.
+A progressive cable is one of `flexible_cable`: it has states of its own, and its force is continuous where
+it goes slack.
+
+Arguments: p, parameter record; x, state (19,); inner, inner state (41,); see `state`.
 """
 
 from __future__ import annotations
@@ -16,7 +19,8 @@ from __future__ import annotations
 from typing import Any
 
 from sitl_bridge.compiled import kernel
-from sitl_bridge.plant.physics.state import CABLE_HOLDS, Array
+from sitl_bridge.plant.physics.flexible_cable import LINEAR, PROGRESSIVE, progressive_tension
+from sitl_bridge.plant.physics.state import CABLE_HOLDS, CABLE_STATE, Array
 
 
 @kernel
@@ -76,16 +80,16 @@ def taut_margin_of(p: Any, x: Array) -> float:
 
 @kernel
 def is_taut(p: Any, x: Array, inner: Array) -> bool:
-    """Whether the cable exerts a force in this state: it holds, and is two-way or taut."""
-    if inner[CABLE_HOLDS] == 0.0:
+    """Whether a spring-damper exerts a force in this state: it holds, and is two-way or taut."""
+    if inner[CABLE_HOLDS] == 0.0 or p.cable_kind != LINEAR:
         return False
     return bool(p.two_way) or taut_margin_of(p, x) > 0.0
 
 
 @kernel
 def goes_slack(p: Any, inner: Array) -> bool:
-    """Whether the cable can change between slack and taut at all: it holds, and cannot push."""
-    return inner[CABLE_HOLDS] > 0.0 and not p.two_way
+    """Whether a spring-damper can change between slack and taut at all: it holds, and cannot push."""
+    return inner[CABLE_HOLDS] > 0.0 and not p.two_way and p.cable_kind == LINEAR
 
 
 @kernel
@@ -104,6 +108,8 @@ def tension_of(p: Any, x: Array, inner: Array) -> float:
     if inner[CABLE_HOLDS] == 0.0:
         return 0.0
     length, rate = stretch(x)
+    if p.cable_kind == PROGRESSIVE:
+        return float(progressive_tension(p, length / p.rest_length - 1.0, inner, CABLE_STATE))
     return float(tension(p, length, rate))
 
 

@@ -25,14 +25,18 @@ from sitl_bridge.plant.physics.cable import (
     taut_margin_of,
     tension_of,
 )
+from sitl_bridge.plant.physics.flexible_cable import LINEAR, flexible_cable
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle, move_anchors
 from sitl_bridge.plant.physics.hoist import begin_reeling, end_reeling, take_hoist_commands, work_gripper
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.rotors import rotor_decay, rotor_wrench, spin_up
 from sitl_bridge.plant.physics.state import (
     ANGULAR_ACCELERATION,
+    CABLE_HOLDS,
+    CABLE_STATE,
     INNER_SIZE,
     LOAD_GROUND_FORCE,
+    MOST_CABLE_STATES,
     MOST_ROTORS,
     STATE_SIZE,
     TENSION,
@@ -40,10 +44,13 @@ from sitl_bridge.plant.physics.state import (
     Array,
 )
 
-WORK_ROWS = 11
+WORK_ROWS = 12
+WORK_SHAPE = (WORK_ROWS, STATE_SIZE + MOST_CABLE_STATES)
 """Rows of the scratch array: 0 to 4 Runge-Kutta, 5 ground, 6 state at the start of the step, 7 decays, 8 to
-10 rotor speeds in the middle and at the end of a step, and at the start of a split one."""
-_GROUND, _START, _DECAY, _MIDDLE, _END, _SPLIT = 5, 6, 7, 8, 9, 10
+10 rotor speeds in the middle and at the end of a step, and at the start of a split one, 11 forces on the
+bodies with those of a flexible cable. Its states follow those of the bodies."""
+_GROUND, _START, _DECAY, _MIDDLE, _END, _SPLIT, _ACTING = 5, 6, 7, 8, 9, 10, 11
+_PROBE = 4
 _FIRST_ANGULAR: int = ANGULAR_ACCELERATION.start
 
 
@@ -61,7 +68,7 @@ def state_derivative(
 ) -> None:
     """Time derivative of the state.
 
-    p: parameter record; x: state (19,), see `state`; inner: inner state (35,), of which anchors are read;
+    p: parameter record; x: state (19,), see `state`; inner: inner state (41,), of which anchors are read;
     wrench: of the rotors; cable_taut: whether the cable exerts its force; force: (6,) external force on
     vehicle and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (7,) or
     more, scratch; out: (19,), written.
@@ -129,7 +136,7 @@ def runge_kutta_4(
     Rotor speeds at the start are those of `inner`, those in the middle and at the end are in `work`.
     step: s; work: scratch. The quaternion is brought back to unit length afterwards.
     """
-    k1, k2, k3, k4, probe, ground = work[0], work[1], work[2], work[3], work[4], work[_GROUND]
+    k1, k2, k3, k4, probe, ground = work[0], work[1], work[2], work[3], work[_PROBE], work[_GROUND]
     half, sixth = 0.5 * step, step / 6.0
     end = rotor_wrench(p, work[_END])
     start = middle = end
@@ -137,18 +144,29 @@ def runge_kutta_4(
         start, middle = rotor_wrench(p, inner), rotor_wrench(p, work[_MIDDLE])
     for i in range(STATE_SIZE):
         probe[i] = x[i]
+    for i in range(p.cable_states):
+        probe[STATE_SIZE + i] = inner[CABLE_STATE + i]
+    acting = work[_ACTING]
+    for i in range(6):
+        acting[i] = force[i]
     # One call for all four stages, so that the compiler can put `state_derivative` in its place.
     for stage in range(4):
         rate = work[stage]
         wrench = start if stage == 0 else middle
         if stage == 3:
             wrench = end
-        state_derivative(p, probe, inner, wrench, cable_taut, force, wind, ground, rate)
+        if p.cable_kind != LINEAR:
+            flexible_cable(p, probe, inner[CABLE_HOLDS] > 0.0, force, wind, rate, acting)
+        state_derivative(p, probe, inner, wrench, cable_taut, acting, wind, ground, rate)
         ahead = step if stage == 2 else half
         for i in range(STATE_SIZE):
             probe[i] = x[i] + ahead * rate[i]
+        for i in range(p.cable_states):
+            probe[STATE_SIZE + i] = inner[CABLE_STATE + i] + ahead * rate[STATE_SIZE + i]
     for i in range(STATE_SIZE):
         x[i] += sixth * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+    for i in range(STATE_SIZE, STATE_SIZE + p.cable_states):
+        inner[CABLE_STATE - STATE_SIZE + i] += sixth * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     norm = math.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
     for i in range(6, 10):
         x[i] /= norm
@@ -274,7 +292,17 @@ def fill_reactions(
     """What acts on the bodies in this state, see `state` for the elements of `reactions` (9,), written."""
     rate = work[0]
     cable_taut = is_taut(p, x, inner)
-    state_derivative(p, x, inner, rotor_wrench(p, inner), cable_taut, force, wind, work[_GROUND], rate)
+    acting = work[_ACTING]
+    for i in range(6):
+        acting[i] = force[i]
+    if p.cable_kind != LINEAR:
+        probe = work[_PROBE]
+        for i in range(STATE_SIZE):
+            probe[i] = x[i]
+        for i in range(p.cable_states):
+            probe[STATE_SIZE + i] = inner[CABLE_STATE + i]
+        flexible_cable(p, probe, inner[CABLE_HOLDS] > 0.0, force, wind, rate, acting)
+    state_derivative(p, x, inner, rotor_wrench(p, inner), cable_taut, acting, wind, work[_GROUND], rate)
     qw, qx, qy, qz = x[6], x[7], x[8], x[9]
     ax, ay, az = rate[3], rate[4], rate[5] + p.gravity
     reactions[0] = (
@@ -309,7 +337,7 @@ TABLE_ROWS = 1024
     Buffer(np.float64, (MOST_ROTORS,)),
     Buffer(np.float64, (TABLE_ROWS, 6)),
     Buffer(np.float64, (TABLE_ROWS, 6)),
-    Buffer(np.float64, (WORK_ROWS, STATE_SIZE)),
+    Buffer(np.float64, WORK_SHAPE),
     int,
     int,
     int,

@@ -7,9 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.plant.physics.flexible_cable import LINEAR, PROGRESSIVE
 from sitl_bridge.plant.physics.ground import contact, leg_reach
 from sitl_bridge.plant.physics.hoist import HOIST, hoist
 from sitl_bridge.plant.physics.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
+from sitl_bridge.vehicle.cable_law import BRANCH_SPEEDS, BRANCHES, bounce_rate, branches, cable_law
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.physics import mode_rate
 
@@ -25,6 +27,12 @@ PARAMETERS = np.dtype(
         ("reel_rate", "f8"),  # m/s, at which the rest length changes
         ("breaking_tension", "f8"),
         ("two_way", "b1"),
+        ("cable_kind", "i8"),  # see `flexible_cable`
+        ("cable_states", "i8"),  # that it adds to the inner state
+        ("curve_scale", "f8"),  # N, of the static curve, see `cable_law`
+        ("curve_rate", "f8"),
+        ("branch_weight", "f8", BRANCHES),
+        ("branch_rate", "f8", BRANCHES),  # 1/s
         ("has_lag", "b1"),
         ("has_drag", "b1"),
         ("has_ground", "b1"),
@@ -81,6 +89,9 @@ def parameters(vehicle: Vehicle) -> Parameters:
     p["has_hoist"] = vehicle.gripper is not None or vehicle.winch is not None
     p["hoist"] = hoist(vehicle)
     p["two_way"] = vehicle.cable.model == "two-way"
+    p["cable_kind"] = LINEAR
+    if not vehicle.cable.is_linear:
+        _fill_progressive(p, vehicle)
     p["rotor_count"] = len(vehicle.rotors)
     for index, rotor in enumerate(vehicle.rotors):
         p["rotor_x"][index], p["rotor_y"][index], _ = rotor.position
@@ -96,6 +107,15 @@ def parameters(vehicle: Vehicle) -> Parameters:
     if vehicle.ground is not None:
         _fill_ground(p, vehicle)
     return record
+
+
+def _fill_progressive(p: np.void, vehicle: Vehicle) -> None:
+    law = cable_law(vehicle)
+    p["cable_kind"], p["cable_states"] = PROGRESSIVE, BRANCHES
+    p["curve_scale"], p["curve_rate"] = law.scale, law.rate
+    p["branch_weight"] = branches(law.loss_factor).weights
+    p["branch_rate"] = bounce_rate(vehicle, law) * BRANCH_SPEEDS
+    p["breaking_tension"] = vehicle.cable.breaking_tension or law.breaking_load
 
 
 def _fill_ground(p: np.void, vehicle: Vehicle) -> None:
@@ -129,7 +149,10 @@ def fastest_rate(vehicle: Vehicle, lightest_load: float | None = None) -> float:
     """
     load_mass = min(vehicle.load.mass, lightest_load or math.inf)
     reduced = 1.0 / (1.0 / vehicle.airframe.mass + 1.0 / load_mass)
-    modes = [(vehicle.cable.stiffness / reduced, vehicle.cable.damping / reduced)]
+    if vehicle.cable.is_linear:
+        modes = [(vehicle.cable.stiffness / reduced, vehicle.cable.damping / reduced)]
+    else:
+        modes = [(_stiffest(vehicle) / reduced, 0.0)]
     if vehicle.ground is not None:
         stiffness, _, damping = contact(
             vehicle.ground, vehicle.gravity, vehicle.airframe.mass, len(vehicle.airframe.legs)
@@ -144,6 +167,13 @@ def fastest_rate(vehicle: Vehicle, lightest_load: float | None = None) -> float:
             squares.append(stiffness * arms / inertia)
         modes += [(square, square * damping / stiffness) for square in squares]
     return max(mode_rate(square, double) for square, double in modes)
+
+
+def _stiffest(vehicle: Vehicle) -> float:
+    """Largest stiffness, N/m, of a cable of a material before it breaks, all its branches stuck."""
+    law = cable_law(vehicle)
+    tangent = max(law.tangent(0.0), law.tangent(law.breaking_load))
+    return tangent / vehicle.cable.rest_length * (1.0 + float(np.sum(branches(law.loss_factor).weights)))
 
 
 LONGEST_STEP = 1e-3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sitl_bridge.plant.physics.disturbance import HELD
-from sitl_bridge.plant.physics.dynamics import WORK_ROWS
+from sitl_bridge.plant.physics.dynamics import WORK_SHAPE
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.state import INNER_SIZE, MOST_ROTORS, REACTIONS_SIZE, STATE_SIZE
 from sitl_bridge.plant.sensors.instruments import INSTRUMENTS, MEASUREMENT
@@ -32,7 +32,7 @@ WORLD = np.dtype(
         ("rotor_speed", "f8", MOST_ROTORS),  # rad/s, as commanded
         ("force", HELD),  # N, external, on vehicle and load, world
         ("wind", HELD),  # m/s, at vehicle and load, world
-        ("work", "f8", (WORK_ROWS, STATE_SIZE)),  # scratch of the integrator
+        ("work", "f8", WORK_SHAPE),  # scratch of the integrator
         ("magnetic_field", "f8", 3),  # T, ENU
         ("reactions", "f8", REACTIONS_SIZE),  # see `state`
         ("truth", MEASUREMENT, (1,)),  # what ideal sensors would read

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from sitl_bridge.frames import quaternion_from_euler, rotate
 from sitl_bridge.ids import ACTUATOR_CONTROLS
+from sitl_bridge.vehicle.cable_law import BRANCHES
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 
 Array = NDArray[np.float64]
@@ -50,7 +51,10 @@ ANCHOR_NORTH = ANCHOR_EAST + CONTACTS
 """m, world: the point of the ground that each contact sticks to; east of all contacts, then north."""
 CABLE_HOLDS = ANCHOR_NORTH + CONTACTS
 """1 while the cable joins vehicle and load, 0 once it has broken or let go."""
-INNER_SIZE = CABLE_HOLDS + 1
+CABLE_STATE = CABLE_HOLDS + 1
+"""The first of what a cable remembers that is more than a spring and damper, see `flexible_cable`."""
+MOST_CABLE_STATES = 6
+INNER_SIZE = CABLE_STATE + MOST_CABLE_STATES
 
 SPECIFIC_FORCE = slice(0, 3)
 """m/s², body FLU: what an accelerometer at the centre of mass feels; cable, drag and ground included."""
@@ -78,7 +82,7 @@ def initial_state(vehicle: Vehicle) -> Array:
 
 
 def initial_inner_state(vehicle: Vehicle) -> Array:
-    """The inner state (35,) at the start: rotors at hover speed in the air and still on the ground."""
+    """The inner state (41,) at the start: rotors at hover speed in the air and still on the ground."""
     inner = np.zeros(INNER_SIZE)
     if vehicle.initial.start == "hover":
         inner[: len(vehicle.rotors)] = hover_rotor_speeds(vehicle)
@@ -89,4 +93,7 @@ def initial_inner_state(vehicle: Vehicle) -> Array:
         inner[ANCHOR_EAST + index], inner[ANCHOR_NORTH + index] = x + offset[0], y + offset[1]
     inner[ANCHOR_EAST + LOAD_CONTACT], inner[ANCHOR_NORTH + LOAD_CONTACT] = vehicle.initial_load_position[:2]
     inner[CABLE_HOLDS] = 1.0
+    if not vehicle.cable.is_linear:  # it has relaxed
+        strain = vehicle.initial_length / vehicle.cable.rest_length - 1.0
+        inner[CABLE_STATE : CABLE_STATE + BRANCHES] = max(strain, 0.0)
     return inner

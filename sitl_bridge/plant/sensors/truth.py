@@ -8,7 +8,7 @@ import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.frames import rotate_inverse
-from sitl_bridge.plant.physics.dynamics import WORK_ROWS, fill_reactions
+from sitl_bridge.plant.physics.dynamics import WORK_SHAPE, fill_reactions
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.state import INNER_SIZE, REACTIONS_SIZE, STATE_SIZE, Array
 from sitl_bridge.plant.sensors.atmosphere import ZERO_CELSIUS, air_pressure, air_temperature
@@ -21,7 +21,7 @@ from sitl_bridge.plant.sensors.instruments import MEASUREMENT
     Buffer(np.float64, (INNER_SIZE,)),
     Buffer(np.float64, (6,)),
     Buffer(np.float64, (6,)),
-    Buffer(np.float64, (WORK_ROWS, STATE_SIZE)),
+    Buffer(np.float64, WORK_SHAPE),
     Buffer(np.float64, (3,)),
     Buffer(np.float64, (REACTIONS_SIZE,)),
     Buffer(MEASUREMENT, (1,)),

@@ -56,7 +56,7 @@ def arrays(
         padded(rotor_speed),
         forces,
         np.zeros((dynamics.TABLE_ROWS, 6)),
-        np.zeros((dynamics.WORK_ROWS, STATE_SIZE)),
+        np.zeros(dynamics.WORK_SHAPE),
     )
 
 

@@ -9,6 +9,7 @@ from scipy.signal import welch
 from sitl_bridge.plant.physics.air import WIND_HOLD, Wind, gust_velocity
 from sitl_bridge.plant.physics.disturbance import HELD, HeldWind
 from sitl_bridge.plant.physics.parameters import step_count
+from sitl_bridge.plant.physics.state import CABLE_HOLDS
 from sitl_bridge.plant.physics.turbulence import Turbulent, dryden
 from sitl_bridge.plant.random_streams import stream
 from sitl_bridge.vehicle.description import Gust, Turbulence, Vehicle
@@ -31,7 +32,7 @@ def test_terminal_velocity() -> None:
         "load.drag.linear=0.02",
     )
     plant.x[:3] = 0.2, 0.0, 3000.0
-    plant.inner[-1] = 0.0
+    plant.inner[CABLE_HOLDS] = 0.0
     plant.run(30.0)
     speed, drag = -plant.x[18], plant.vehicle.load.drag
     assert drag.linear * speed + drag.quadratic * speed**2 == pytest.approx(0.3 * 9.81, rel=1e-3)

@@ -15,6 +15,7 @@ from sitl_bridge.plant.physics.battery import (
     reading,
     shaft_coefficient,
 )
+from sitl_bridge.plant.physics.state import CABLE_HOLDS
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.vehicle.description import Battery, Vehicle, hover_rotor_speeds
 from sitl_bridge.vehicle.files import load_vehicle
@@ -37,7 +38,7 @@ def test_lag_is_exact(step: float) -> None:
 def test_thrust_follows_the_lagging_speed() -> None:
     """Climb after a step of all rotors, in empty air, against an adaptive integrator."""
     plant = flight("iris", "initial.start=hover", "airframe.drag.linear=0", "airframe.drag.quadratic=0")
-    plant.inner[-1] = 0.0
+    plant.inner[CABLE_HOLDS] = 0.0
     hover, high = plant.inner[0], 900.0
     plant.command[:4] = high
     start = plant.x[2]
