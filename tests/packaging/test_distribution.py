@@ -6,6 +6,7 @@ audit hook in it forbids what a read-only installation without a network forbids
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -153,6 +154,17 @@ def test_it_flies_read_only_and_offline(fresh: Path, tmp_path: Path) -> None:
     flight = ["fly", "setpoint", "--in-process", "--duration", "12", "--out", tmp_path / "out"]
     assert "settled" in _run(fresh.with_name("sitl"), *flight, cwd=tmp_path).stdout
     assert (tmp_path / "out/flight.png").exists()
+
+
+def test_the_doctor_knows_what_an_installation_requires(fresh: Path, tmp_path: Path) -> None:
+    script = "import json; from sitl.doctor.installation import packages, requirements; "
+    script += "print(json.dumps([packages(), requirements()]))"
+    found, wanted = json.loads(_run(fresh, "-c", script, cwd=tmp_path).stdout)
+    assert found[0] == "ok", found
+    assert len(wanted.pop("")) == len(PROJECT["dependencies"])
+    assert {extra: len(texts) for extra, texts in wanted.items()} == {
+        extra: len(texts) for extra, texts in PROJECT["optional-dependencies"].items()
+    }
 
 
 def test_the_fixtures_first_test_passes(fresh: Path, tmp_path: Path) -> None:
