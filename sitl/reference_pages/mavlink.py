@@ -26,6 +26,7 @@ PLANT_SENDS = {
     "GLOBAL_POSITION_INT": "of the load, five times a second; also `--load-to`",
     "BATTERY_STATUS": "twice a second, of a vehicle with a battery",
     "LANDING_TARGET": "of the load, by a vehicle with a load tracker",
+    "WINCH_STATUS": "twenty times a second, of a vehicle with a winch",
     "COMMAND_ACK": "to COMMAND_LONG",
 }
 PLANT_TAKES = {
