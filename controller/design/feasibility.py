@@ -13,7 +13,7 @@ import numpy as np
 from controller.design.ramp import LARGEST_THRUST, STEEPEST, Demand, demand_of_circle, planned
 from controller.law.reference import Path, circle
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
-from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
+from sitl_bridge.vehicle.rotors import Rotor, full_thrust, rotor_effect
 
 LEAST_THRUST = 1.05
 """Of what hovering takes, of each rotor: with less, `heavy` could not be steered on noisy sensors."""
@@ -48,7 +48,7 @@ def _thrust(vehicle: Vehicle) -> list[str]:
     ratio = shares[busiest] ** -2
     if ratio >= LEAST_THRUST:
         return []
-    full = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+    full = full_thrust(vehicle.rotors)
     too_heavy = vehicle.airframe.mass + vehicle.load.mass - full / LEAST_THRUST / vehicle.gravity
     lighter = f" or {_short(too_heavy)} kg less" if too_heavy > 0.0 else ""
     fastest = vehicle.rotors[busiest].max_speed * math.sqrt(LEAST_THRUST / ratio)

@@ -16,7 +16,7 @@ from controller.law.reference import SMOOTH_STEP, Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Drag, Vehicle
-from sitl_bridge.vehicle.rotors import rotor_effect
+from sitl_bridge.vehicle.rotors import full_thrust, rotor_effect
 
 LARGEST_TILT = math.radians(25.0)
 """Of the vehicle along the ramp, rad."""
@@ -122,7 +122,7 @@ def _within(path: Path, vehicle: Vehicle, ramp_time: float) -> bool:
     """Whether the ramp asks for no more than the limits, or than the path does itself behind it."""
     ramp = demand(path, vehicle, ramp_time, np.linspace(0.0, ramp_time, _SAMPLES))
     tilt, tension = LARGEST_TILT, LEAST_TENSION * vehicle.load.mass * vehicle.gravity
-    hover = vehicle.hover_thrust / _available(vehicle)
+    hover = vehicle.hover_thrust / full_thrust(vehicle.rotors)
     thrust = max(LARGEST_THRUST, hover + 0.25 * (1.0 - hover))
     if path["radius"][0] > 0.0:
         own = demand_of_circle(path, vehicle)
@@ -130,11 +130,6 @@ def _within(path: Path, vehicle: Vehicle, ramp_time: float) -> bool:
         tilt, thrust = max(tilt, steep), max(thrust, own.thrust)
         tension = min(tension, own.tension)
     return ramp.tilt <= tilt and ramp.thrust <= thrust and ramp.tension >= tension
-
-
-def _available(vehicle: Vehicle) -> float:
-    """N, of all rotors at full speed."""
-    return sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
 
 
 def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:

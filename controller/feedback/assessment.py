@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol
 from controller.ground.telemetry.vehicle_state import VehicleView
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.rotors import full_thrust
 
 CONTACT_MARGIN = 0.02
 """m, above rest, up to which a body that is seen exactly counts as on the ground."""
@@ -48,7 +49,7 @@ class ExactAssessor:
         cable = vehicle.cable
         self._rest_length = cable.rest_length
         # A cable that is stretched by all that the rotors can pull is as long as one can be.
-        pull = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+        pull = full_thrust(vehicle.rotors)
         self._lost_length = LOST_LOAD * (cable.rest_length + pull / cable.stiffness)
         ground = vehicle.ground
         self._vehicle_rest = self._load_rest = -math.inf

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
+from sitl_bridge.vehicle.rotors import full_thrust as all_rotors
 from sitl_bridge.vehicle.schema import Section, quantity
 
 Kind = Literal["px4", "ardupilot"]
@@ -46,7 +47,7 @@ def full_thrust(vehicle: Vehicle, stack: Stack) -> float:
     """N at a thrust set-point of 1."""
     if stack.full_thrust is not None:
         return stack.full_thrust
-    return sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+    return all_rotors(vehicle.rotors)
 
 
 def thrust_setpoint(force: float, full: float, curve: float) -> float:

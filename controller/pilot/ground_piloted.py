@@ -49,6 +49,7 @@ from sitl_bridge.mavlink.fields import pack_voltage
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.mavlink.hil import HIL_GPS
 from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.rotors import full_thrust
 
 IDLE_COMMAND = 0.08
 """Rotors of a vehicle that is armed on the ground, as a share of their largest speed."""
@@ -110,7 +111,7 @@ class GuidedAutopilot:
         self._allocation = allocation(vehicle)
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
         self._trajectory = Trajectory(self._period, motion_pole(vehicle.hover_length, vehicle.gravity))
-        thrust = sum(rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors)
+        thrust = full_thrust(vehicle.rotors)
         weight = vehicle.gravity * (vehicle.airframe.mass + vehicle.load.mass)
         spare = THRUST_SHARE * thrust / weight - 1.0
         self._most_acceleration = max(LEAST_ACCELERATION, spare * vehicle.gravity)
