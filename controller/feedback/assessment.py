@@ -35,8 +35,14 @@ class Contact(NamedTuple):
 class Assessor(Protocol):
     """Judges a feedback, for an autopilot under ground control."""
 
+    sees_free_load: bool
+    """Whether the estimate says where a load is that is off its cable"""
+
     def contact(self, estimate: Array) -> Contact:
         """What touches what at an estimate (18,), eq. 31."""
+
+    def load_released(self) -> None:
+        """The gripper has let the load go."""
 
     def assess(self, view: VehicleView) -> list[str]:
         """Write the health of sensors and estimate into the view; what there is to say."""
@@ -44,6 +50,8 @@ class Assessor(Protocol):
 
 class ExactAssessor:
     """For feedback that is the truth: geometry says what touches what, and all is well."""
+
+    sees_free_load = True
 
     def __init__(self, vehicle: Vehicle) -> None:
         cable = vehicle.cable
@@ -71,6 +79,9 @@ class ExactAssessor:
             load_attached=length <= self._lost_length,
             in_flight=not grounded and any(x[6:12]),  # held by the plant it would be at rest
         )
+
+    def load_released(self) -> None:
+        """Truth does not need to know."""
 
     def assess(self, view: VehicleView) -> list[str]:
         """Nothing to say."""

@@ -15,6 +15,8 @@ from controller.law.state import Array
 class EstimateAssessor:
     """Judges the estimate that an autopilot under ground control flies on."""
 
+    sees_free_load = False
+
     def __init__(self, feedback: EstimateFeedback) -> None:
         self._feedback = feedback
         self._watch = HealthWatch(feedback.estimator.vehicle.sensors.tracker is not None)
@@ -33,6 +35,10 @@ class EstimateAssessor:
             load_attached=load != LOAD_RELEASED,
             in_flight=aligned and estimator.in_flight,
         )
+
+    def load_released(self) -> None:
+        """The filter's cable pulls no more."""
+        self._feedback.estimator.load_released()
 
     def assess(self, view: VehicleView) -> list[str]:
         """Health and quality into the view; what there is to say."""

@@ -45,6 +45,7 @@ from controller.law.state import (
 )
 from controller.pilot.gps_display import Receiver
 from sitl_bridge.frames import CENTIAMPERES_PER_AMPERE, PERCENT, Triple, quaternion_from_euler
+from sitl_bridge.ids import GRIPPER_CONTROL
 from sitl_bridge.mavlink.fields import pack_voltage
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.mavlink.hil import HIL_GPS
@@ -109,6 +110,10 @@ class GuidedAutopilot:
         self._redesigner = redesigner
         self._controls = controls
         self._allocation = allocation(vehicle)
+        self._gripper_control = len(vehicle.rotors) + GRIPPER_CONTROL
+        gripper = station.machine.gripper
+        if gripper is not None:
+            gripper.sees_free_load = self._assessor.sees_free_load
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
         self._trajectory = Trajectory(self._period, motion_pole(vehicle.hover_length, vehicle.gravity))
         thrust = full_thrust(vehicle.rotors)
@@ -153,6 +158,8 @@ class GuidedAutopilot:
             self.station.machine.disarm(force=True)
         self._law = None
         self._view = None
+        if self.station.machine.gripper is not None:
+            self.station.machine.gripper.restart()
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
@@ -182,6 +189,8 @@ class GuidedAutopilot:
         target = self.station.update(view, now)
         self._take_designs()
         self._fly(target, estimate, view, contact)
+        if self.station.machine.gripper is not None:
+            self._controls[self._gripper_control] = self.station.machine.gripper.output
 
     def _seen(self, estimate: Array, time_usec: int, now: float) -> tuple[VehicleView, Contact, bool]:
         """The view of an estimate, what touches what in it, and whether it is the first."""
@@ -198,6 +207,7 @@ class GuidedAutopilot:
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
         view.acceleration = tuple(self._accelerometer.tolist())
         contact = self._assessor.contact(estimate)
+        self._work_gripper(view, now)
         if view.load_attached and not contact.load_attached:  # for good: it may well lie within reach again
             view.load_attached = False
             self.station.announce(Notice(WARNING, "The load is lost: flying without it"), now)
@@ -211,6 +221,17 @@ class GuidedAutopilot:
         view.hil_age = 0.0
         view.throttle = float(self._controls[: len(self._vehicle.rotors)].mean()) if self.armed else 0.0
         return view, contact, first
+
+    def _work_gripper(self, view: VehicleView, now: float) -> None:
+        """Fly without the load once the gripper has let it go, and with it once it has taken it."""
+        gripper = self.station.machine.gripper
+        if gripper is None or not gripper.update(view, self.armed, self._vehicle.cable.rest_length):
+            return
+        view.load_attached = not gripper.released
+        if gripper.released:
+            self._assessor.load_released()
+        text = "Load released" if gripper.released else "Load taken"
+        self.station.announce(Notice(INFO, text), now)
 
     def _fly(self, target: Target, estimate: Array, view: VehicleView, contact: Contact) -> None:
         if isinstance(target, Attitude):

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import OK, UNSUPPORTED, UNSUPPORTED_FRAME, Verdict, deny, not_now
 from controller.ground.flight.geometry import filled
+from controller.ground.flight.gripper import GRIPPER_ACTIONS, HOLD
 from controller.ground.flight.modes import Machine, Reposition
 from controller.ground.flight.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
 from controller.ground.flight.px4_modes import Mode, find_mode, find_standard_mode
@@ -275,6 +276,12 @@ def _or(value: float, default: float) -> float:
     return default if math.isnan(value) else value
 
 
+def _gripper(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    if c.p2 not in GRIPPER_ACTIONS:
+        return deny(f"Gripper denied: action {c.p2:g}; use 0 (release), 1 (grab) or 2 (hold)")
+    return OK if c.p2 == HOLD and machine.gripper is not None else machine.grip(int(c.p2))
+
+
 def _pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 == 0.0:
         return machine.set_mode(Mode.HOLD, now)
@@ -407,6 +414,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_DO_REPOSITION: _reposition,
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_FIGURE_EIGHT: _figure_eight,
+    mavlink.MAV_CMD_DO_GRIPPER: _gripper,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_MISSION_START: _mission_start,

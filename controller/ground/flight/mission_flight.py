@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.flight.gripper import GRAB, PATIENCE, RELEASE, Gripper
 from controller.ground.flight.region_of_interest import RegionOfInterest
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,
     DELAYS,
+    GRIPPER,
     JUMP,
     LAND,
     LOITER,
@@ -65,7 +67,9 @@ class Waypoint(NamedTuple):
 class MissionFlight:
     """The plan's progress. It survives a pause, and starts again at the beginning when it was complete."""
 
-    def __init__(self) -> None:
+    def __init__(self, gripper: Gripper | None = None) -> None:
+        """gripper: that items work; None: they are passed over."""
+        self._gripper = gripper
         self.replace(())
 
     def replace(self, items: tuple[Item, ...]) -> None:
@@ -147,6 +151,10 @@ class MissionFlight:
             elif item.command in POINTING:
                 self.region.point_at(item, self.items, place)
                 self._next()
+            elif item.command == GRIPPER and self._gripper is not None:
+                if not self._grips(item, self._gripper, view.time):
+                    return Waypoint(None, math.nan)
+                self._next()
             elif item.command not in (*WITH_POSITION, *DELAYS):
                 self._next()
             else:
@@ -154,6 +162,15 @@ class MissionFlight:
                 if stay is not None:
                     return stay
         return Then.LOST
+
+    def _grips(self, item: Item, gripper: Gripper, time: float) -> bool:
+        """Whether the gripper has done what an item says, or has been waited for long enough."""
+        if item.p2 not in (RELEASE, GRAB):
+            return True
+        if self._since is None:
+            self._since = time
+            gripper.act(int(item.p2))
+        return gripper.done or time - self._since >= PATIENCE
 
     def _fly(
         self, item: Item, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float

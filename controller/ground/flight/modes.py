@@ -39,6 +39,7 @@ from controller.ground.commands.result import (
     FAILED,
     INFO,
     OK,
+    UNSUPPORTED,
     WARNING,
     Notice,
     Verdict,
@@ -49,6 +50,7 @@ from controller.ground.commands.setpoints import Offboard, Setpoint
 from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
 from controller.ground.flight.fence import Fence
 from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
+from controller.ground.flight.gripper import GRAB, Gripper
 from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.patterns import Orbit, Pattern
@@ -95,7 +97,9 @@ class Machine:
         self.mode = Mode.HOLD
         self.offboard = Offboard()
         self.sticks = Sticks()
-        self.mission = MissionFlight()
+        self.gripper = None if profile.gripper is None else Gripper(profile.gripper)
+        """None: there is none."""
+        self.mission = MissionFlight(self.gripper)
         self.failsafes = Failsafes()
         self.target: Target = Idle(False)
         self.notices: list[Notice] = []
@@ -297,6 +301,15 @@ class Machine:
             self._guidance.take_off(self.view)
         self.enter(Mode.ORBIT if isinstance(pattern, Orbit) else Mode.HOLD)
         self._guidance.pattern = pattern
+        return OK
+
+    def grip(self, action: int) -> Verdict:
+        """Release (0) or grab (1) the load; done when the outputs are live and the hook is within reach."""
+        if self.gripper is None:
+            return Verdict(UNSUPPORTED, "Gripper denied: this vehicle has none; see [gripper] in its file")
+        if action == GRAB and self.gripper.released and not self.gripper.sees_free_load:
+            return deny("Gripper denied: nothing shows where the released load is; fly on truth to take it")
+        self.gripper.act(action)
         return OK
 
     @property

@@ -14,6 +14,7 @@ TAKEOFF: int = mavlink.MAV_CMD_NAV_TAKEOFF
 PAYLOAD_PLACE: int = mavlink.MAV_CMD_NAV_PAYLOAD_PLACE
 DELAY: int = mavlink.MAV_CMD_NAV_DELAY
 CONDITION_DELAY: int = mavlink.MAV_CMD_CONDITION_DELAY
+GRIPPER: int = mavlink.MAV_CMD_DO_GRIPPER
 JUMP: int = mavlink.MAV_CMD_DO_JUMP
 CHANGE_SPEED: int = mavlink.MAV_CMD_DO_CHANGE_SPEED
 SET_HOME: int = mavlink.MAV_CMD_DO_SET_HOME
@@ -64,7 +65,7 @@ WITHOUT_EFFECT: dict[int, str] = {
     **dict.fromkeys(_CAMERA, "camera"),
     **dict.fromkeys(_GIMBAL, "gimbal"),
     **dict.fromkeys(_OUTPUTS, "servo"),
-    mavlink.MAV_CMD_DO_GRIPPER: "gripper",
+    GRIPPER: "gripper",
     mavlink.MAV_CMD_DO_WINCH: "winch",
 }
 """Commands for hardware that is not there, with its name"""

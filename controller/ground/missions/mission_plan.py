@@ -11,6 +11,7 @@ from controller.ground.flight.fence import Fence
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,
     DELAYS,
+    GRIPPER,
     JUMP,
     LAND,
     LOITER_TIME,
@@ -110,10 +111,13 @@ def remarks(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fe
     idle: dict[str, list[str]] = {}
     low = []
     for index, item in enumerate(items):
+        if item.command == GRIPPER and profile.gripper is not None:
+            continue
         if item.command in WITHOUT_EFFECT:
             idle.setdefault(WITHOUT_EFFECT[item.command], []).append(str(index))
         elif item.command == PAYLOAD_PLACE:
-            idle.setdefault("gripper", []).append(str(index))
+            placing = "gripper" if profile.gripper is None else "payload placing"
+            idle.setdefault(placing, []).append(str(index))
         if item.has_place and item.command not in (LAND, TAKEOFF):
             low += [str(index)] if fence.too_low(place(item, profile, home)) else []
     texts = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from sitl_bridge.frames import Geodetic, LocalOrigin, Quaternion, Triple
 from sitl_bridge.ids import load_system, vehicle_system
-from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.description import Gripper, Vehicle
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,8 @@ class Profile:
     """In series; None: there is no battery."""
     hover_thrust: float = 0.5
     """That carries vehicle and load, as a share of what the rotors can give"""
+    gripper: Gripper | None = None
+    """None: there is none."""
 
     @property
     def system(self) -> int:
@@ -57,6 +59,7 @@ def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> 
         0.0 if vehicle.ground is None else vehicle.ground.height,
         None if vehicle.battery is None else vehicle.battery.cells,
         vehicle.hover_thrust / sum(r.thrust_coefficient * r.max_speed**2 for r in vehicle.rotors),
+        vehicle.gripper,
     )
 
 
