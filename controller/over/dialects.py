@@ -44,6 +44,8 @@ class Dialect(NamedTuple):
     """Whether NAV_TAKEOFF's altitude is above home, not above the sea."""
     thrust_parameter: str | None
     """Parameter with the curve from set-point to force, as in `Stack`."""
+    holds: tuple[str, int] | None
+    """Parameter, and the value with which the stack holds when no set-points come any more."""
     thrust_curve: float
     """That curve where no parameter says it."""
     options: tuple[str, int, str] | None
@@ -60,6 +62,7 @@ PX4 = Dialect(
     takeoff_mode=None,
     relative_takeoff=False,
     thrust_parameter="THR_MDL_FAC",
+    holds=("COM_OBL_RC_ACT", 5),
     thrust_curve=0.0,
     options=None,
     patience_parameter="COM_OF_LOSS_T",
@@ -72,6 +75,7 @@ ARDUCOPTER = Dialect(
     takeoff_mode=_arducopter(4),
     relative_takeoff=True,
     thrust_parameter=None,  # it linearises its motors itself, by MOT_THST_EXPO
+    holds=None,
     thrust_curve=1.0,
     options=("GUID_OPTIONS", 8, "thrust of a set-point is a climb rate"),
     patience_parameter="GUID_TIMEOUT",

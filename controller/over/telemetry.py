@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import statistics
+import struct
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -28,6 +29,7 @@ from sitl_bridge.frames import (
 from sitl_bridge.mavlink.framing import Frame, decode
 
 MOST_TEXTS = 50
+_INTEGERS = (mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_UINT32)
 TEXT_LENGTH = 50
 """Characters of a STATUSTEXT; a longer text comes in several."""
 SAMPLES = 5
@@ -216,7 +218,10 @@ class Telemetry:
         self.acks.append(Ack(message.command, message.result))
 
     def _on_parameter(self, frame: Frame, message: Any, now: float) -> None:
-        self.parameters[message.param_id.rstrip("\0")] = message.param_value
+        value = message.param_value
+        if self.autopilot == mavlink.MAV_AUTOPILOT_PX4 and message.param_type in _INTEGERS:
+            [value] = struct.unpack("<i", frame.payload[:4].ljust(4, b"\0"))  # bytes, not a number
+        self.parameters[message.param_id.rstrip("\0")] = float(value)
 
     def _on_text(self, frame: Frame, message: Any, now: float) -> None:
         part = message.text.rstrip("\0")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -27,6 +28,14 @@ NO_LOCK = [
 IMU_AT_REST = (0.0, 0.0, -9.81, *(0.0,) * 10, 0x3F)
 
 
+def parameter(name: str, value: float) -> Any:
+    """PARAM_VALUE as PX4 has it: the bytes of an integer in the place of a float."""
+    if isinstance(value, float):
+        return mavlink.MAVLink_param_value_message(name.encode(), value, 9, 1, 0)
+    [as_float] = struct.unpack("<f", struct.pack("<i", value))
+    return mavlink.MAVLink_param_value_message(name.encode(), as_float, 6, 1, 0)
+
+
 class PlayedStack:
     """Answers as PX4 does; a vehicle that stands still where it is told to."""
 
@@ -38,7 +47,7 @@ class PlayedStack:
         self.setpoints: list[Any] = []
         self.commands: list[Any] = []
         self.autopilot = mavlink.MAV_AUTOPILOT_PX4
-        self.parameters = {"THR_MDL_FAC": 1.0, "COM_OF_LOSS_T": 1.0}
+        self.parameters: dict[str, float] = {"THR_MDL_FAC": 1.0, "COM_OF_LOSS_T": 1.0}
         self._ticks = 0
 
     def receive(self, datagram: bytes) -> list[bytes]:
@@ -51,8 +60,7 @@ class PlayedStack:
             elif message.get_type() == "PARAM_REQUEST_READ":
                 name = message.param_id.rstrip("\0")
                 if name in self.parameters:
-                    value = self.parameters[name]
-                    out.append(mavlink.MAVLink_param_value_message(name.encode(), value, 9, 1, 0))
+                    out.append(parameter(name, self.parameters[name]))
             elif message.get_type() == "COMMAND_LONG":
                 self.commands.append(message)
                 if not self.arms:

@@ -192,3 +192,15 @@ def test_nothing_ages_while_a_simulated_world_stands_still() -> None:
     assert ages.age("state", 11.5) == pytest.approx(0.3)
     assert ages.age("state", 11.2) == pytest.approx(0.2)  # faster than real time
     assert ages.age("state", 11.0 + 2.1 * LONGEST_STANDSTILL) > LONGEST_STANDSTILL  # dead
+
+
+def test_what_a_stack_would_do_without_us_is_said() -> None:
+    flight = Played()
+    flight.stack.parameters |= {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0}
+    flight.run(10.0, lambda: flight.flight.state is State.ARMING)
+    assert any("COM_OF_LOSS_T is 1 s" in text for text in flight.said)
+    assert any("COM_OBL_RC_ACT is 0" in text for text in flight.said)
+    safe = Played()
+    safe.stack.parameters |= {"COM_OF_LOSS_T": 0.3, "COM_OBL_RC_ACT": 5}
+    safe.run(10.0, lambda: safe.flight.state is State.ARMING)
+    assert not any("companion die" in text for text in safe.said)

@@ -22,6 +22,8 @@ ASKED_FOR = (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mavlink.MAVLINK_MSG_ID_HO
 """By MAV_CMD_REQUEST_MESSAGE: not every stack streams them."""
 LONGEST_PATIENCE = 0.3
 """s, of a stack whose set-points stop; at 1 rad/s it then leans by 17° more."""
+PARAMETER_TIME = 3.0
+"""s, in which a stack's parameters come, if it has them."""
 CLEARANCE = 2.5
 """m, of the load above the ground after take-off."""
 OFF_THE_GROUND = 0.5
@@ -49,12 +51,9 @@ def prepare(flight: Flight, now: float) -> None:
             flight.pack(dialects.message_interval(flight.system, message_id, rate))
         for message_id in ASKED_FOR:
             flight.pack(dialects.request_message(flight.system, message_id))
-        dialect = flight.dialect
-        options = None if dialect.options is None else dialect.options[0]
-        for name in (dialect.thrust_parameter, dialect.patience_parameter, options):
-            if name is not None:
-                message = mavlink.MAVLink_param_request_read_message(flight.system, 1, name.encode(), -1)
-                flight.pack(message)
+        for name in _unknown_parameters(flight):
+            message = mavlink.MAVLink_param_request_read_message(flight.system, 1, name.encode(), -1)
+            flight.pack(message)
     t.acks.clear()
     flight.missing = _missing(flight, now)
     if flight.missing:
@@ -63,12 +62,7 @@ def prepare(flight: Flight, now: float) -> None:
     if wrong is not None:
         flight.fail(wrong, now)
         return
-    patience = t.parameters.get(flight.dialect.patience_parameter or "", 0.0)
-    if patience > LONGEST_PATIENCE:
-        flight.say(
-            f"{flight.dialect.patience_parameter} is {patience:g} s: should this companion die, the vehicle "
-            f"turns on with its last rates for so long; {LONGEST_PATIENCE:g} s is safer"
-        )
+    _advise(flight)
     flying = t.armed and t.landed == mavlink.MAV_LANDED_STATE_IN_AIR
     flight.go(State.STREAMING if flying else State.ARMING, now)
 
@@ -82,12 +76,42 @@ def _missing(flight: Flight, now: float) -> str:
     if t.altitude_msl is None or t.home_altitude is None:
         wanted.append("the stack's GLOBAL_POSITION_INT")
     options = flight.dialect.options
-    if options is not None and options[0] not in t.parameters:
+    unknown = _unknown_parameters(flight)
+    if unknown and now - flight.since < PARAMETER_TIME:  # not every version has every parameter
+        wanted.append(f"the stack's parameters {', '.join(unknown)}")
+    elif options is not None and options[0] in unknown:
         wanted.append(f"the stack's parameter {options[0]}")
     source = flight.source.missing(t, now, hanging=False)
     if source is not None:
         wanted.append(source)
     return ", ".join(wanted)
+
+
+def _unknown_parameters(flight: Flight) -> list[str]:
+    """Names of what is wanted of the stack's parameters and has not come."""
+    dialect = flight.dialect
+    options = None if dialect.options is None else dialect.options[0]
+    holds = None if dialect.holds is None else dialect.holds[0]
+    names = (dialect.thrust_parameter, dialect.patience_parameter, options, holds)
+    return [name for name in names if name is not None and name not in flight.telemetry.parameters]
+
+
+def _advise(flight: Flight) -> None:
+    """Say what the stack would do if this companion died, where there is something safer."""
+    parameters, dialect = flight.telemetry.parameters, flight.dialect
+    patience = parameters.get(dialect.patience_parameter or "", 0.0)
+    if patience > 1.01 * LONGEST_PATIENCE:  # it came as a single-precision number
+        flight.say(
+            f"{dialect.patience_parameter} is {patience:g} s: should this companion die, the vehicle "
+            f"turns on with its last rates for so long; {LONGEST_PATIENCE:g} s is safer"
+        )
+    if dialect.holds is not None:
+        name, value = dialect.holds
+        if parameters.get(name, value) != value:
+            flight.say(
+                f"{name} is {parameters[name]:g}: should this companion die, the stack may land instead "
+                f"of holding; {value} holds"
+            )
 
 
 def _wrong_options(flight: Flight) -> str | None:
