@@ -11,6 +11,7 @@ from controller.design.catalogue import design
 from controller.design.margins import closed_loop_matrix, spectral_radius
 from controller.design.model import actuated_model
 from sitl.command_line.commands import main
+from sitl.vehicles.check import fly_step
 from sitl.vehicles.figures import figures, modes
 from sitl_bridge.vehicle.files import load_vehicle, vehicle_names
 
@@ -62,6 +63,14 @@ def test_a_shipped_vehicle_flies(name: str, capsys: pytest.CaptureFixture[str]) 
     assert found["step"]["outcome"] == "settled"
     assert found["thrust_to_weight"] == pytest.approx(1.0 / found["hover_thrust_share"])
     assert found["hover_control"] ** -2 <= found["thrust_to_weight"] * 1.001
+
+
+@pytest.mark.parametrize("damping", [51.0, 130.0])
+def test_a_cable_that_is_damped_beyond_its_bounce_is_flown(damping: float) -> None:
+    """Its relaxation time, 0.5 and 1.3 s, is not short beside a step of two seconds."""
+    step = fly_step(load_vehicle("paper", [f"cable.damping={damping}"]), 1.0)
+    assert step.outcome == "settled"
+    assert step.largest_tilt_deg < 35.0
 
 
 def test_a_vehicle_that_no_law_flies_is_code_1_with_the_reason(capsys: pytest.CaptureFixture[str]) -> None:
