@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import select
 import socket
 import threading
 import tty
@@ -63,6 +65,7 @@ class SerialLine:
     def __init__(self, own_port: int) -> None:
         self._end, far = os.openpty()
         tty.setraw(far)
+        os.set_blocking(self._end, False)
         self.device = os.ttyname(far)
         self._far = far
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -80,10 +83,13 @@ class SerialLine:
                 data, self._peer = self._socket.recvfrom(65536)
             except TimeoutError:
                 continue
-            os.write(self._end, data)
+            with contextlib.suppress(BlockingIOError):  # nobody reads: lost, as on a line
+                os.write(self._end, data)
 
     def _up(self) -> None:
         while self._running:
+            if not select.select([self._end], [], [], 0.2)[0]:
+                continue
             data = os.read(self._end, 4096)
             if self._peer is not None and data:
                 self._socket.sendto(data, self._peer)
@@ -91,7 +97,6 @@ class SerialLine:
     def close(self) -> None:
         """Free everything."""
         self._running = False
-        os.write(self._far, b"end")  # wakes the reader
         for thread in self._threads:
             thread.join()
         for descriptor in (self._end, self._far):
