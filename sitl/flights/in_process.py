@@ -82,10 +82,10 @@ class MemoryLog:
     def __init__(self, world: World) -> None:
         self.table = np.zeros((CHUNK_ROWS, WIDTH))
         self.count = 0
-        self._keep = kept_columns(len(world.vehicle.rotors))
+        self._keep = kept_columns(len(world.vehicle.rotors), world.vehicle.node_count)
         self._fill = fill_row.bind(*world.log_sources(), self.table)
         self._chunks: list[Array] = []
-        self.names = columns(len(world.vehicle.rotors))
+        self.names = columns(len(world.vehicle.rotors), world.vehicle.node_count)
 
     def record(self, time_s: float, world: World) -> None:
         """Keep one row."""

@@ -117,6 +117,8 @@ def linear_cable(vehicle: Vehicle) -> Cable:
     Stiffness and loss are those at the bounce frequency; the length under the load's weight is the same.
     """
     cable = vehicle.cable
+    if cable.is_chain:
+        return cable.model_copy(update={"model": "tension-only"})
     if cable.is_linear:
         return cable
     law, weight = cable_law(vehicle), vehicle.load.mass * vehicle.gravity
@@ -137,6 +139,16 @@ def linear_cable(vehicle: Vehicle) -> Cable:
 
 
 def linearised(vehicle: Vehicle) -> Vehicle:
-    """The vehicle on the linear cable that its own acts as about hover; itself where its cable is linear."""
+    """The vehicle on the linear cable that its own acts as about hover; itself where its cable is linear.
+
+    Vehicle and load carry half of a chain each.
+    """
     cable = linear_cable(vehicle)
-    return vehicle if cable is vehicle.cable else vehicle.model_copy(update={"cable": cable})
+    if cable is vehicle.cable:
+        return vehicle
+    half = 0.5 * vehicle.cable_mass
+    bodies = {
+        name: body.model_copy(update={"mass": body.mass + half})
+        for name, body in (("airframe", vehicle.airframe), ("load", vehicle.load))
+    }
+    return vehicle.model_copy(update={"cable": cable, **bodies})

@@ -15,6 +15,7 @@ from pydantic import field_validator, model_validator
 from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.vehicle.cable_law import cable_law
 from sitl_bridge.vehicle.cable_materials import MaterialName
+from sitl_bridge.vehicle.chain import MOST_SEGMENTS
 from sitl_bridge.vehicle.physics import PhysicsError, physics_faults
 from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
 from sitl_bridge.vehicle.schema import (
@@ -55,10 +56,10 @@ class Cable(Section):
         "N s/m", "c_a of eq. 9; progressive: follows from the loss factor", 0.0, ge=0, le=1e5
     )
     rest_length: float = quantity("m", "l_0 of eq. 9", gt=0, le=1e3)
-    model: Literal["two-way", "tension-only", "linear", "progressive"] = quantity(
+    model: Literal["two-way", "tension-only", "linear", "progressive", "chain"] = quantity(
         "-",
         "two-way also pushes below its rest length (the paper's); tension-only, or linear, never does; "
-        "progressive is a rope of `material`, see docs/cables.md",
+        "progressive is a rope of `material`, chain has segments with mass; see docs/cables.md",
         "tension-only",
     )
     material: MaterialName | None = quantity("-", "of a progressive cable; nylon unless told", None)
@@ -80,6 +81,16 @@ class Cable(Section):
         "N", "more than this, and the cable breaks", None, gt=0, le=1e12
     )
 
+    segments: int = quantity("-", "of a chain", 8, ge=2, le=MOST_SEGMENTS)
+    mass: float | None = quantity("kg", "of a chain; a tenth of the load's unless told", None, gt=0, le=1e3)
+    drag: float = quantity(
+        "N s²/m³",
+        "of a chain, across a metre of it: half of air density times diameter times drag coefficient",
+        0.0,
+        ge=0,
+        le=10,
+    )
+
     @field_validator("model")
     @classmethod
     def _linear_is_tension_only(cls, model: str) -> str:
@@ -87,8 +98,13 @@ class Cable(Section):
 
     @property
     def is_linear(self) -> bool:
-        """Whether it is a spring and damper."""
+        """Whether its force follows from `stiffness` and `damping`."""
         return self.model != "progressive"
+
+    @property
+    def is_chain(self) -> bool:
+        """Whether it has segments, each a spring and damper, with mass."""
+        return self.model == "chain"
 
 
 class Gripper(Section):
@@ -260,7 +276,19 @@ class Vehicle(Section):
     @property
     def hover_thrust(self) -> float:
         """Total thrust that carries vehicle and load, N (eq. 19)."""
-        return (self.airframe.mass + self.load.mass) * self.gravity
+        return (self.airframe.mass + self.load.mass + self.cable_mass) * self.gravity
+
+    @property
+    def cable_mass(self) -> float:
+        """kg; only a chain has any."""
+        if not self.cable.is_chain:
+            return 0.0
+        return 0.1 * self.load.mass if self.cable.mass is None else self.cable.mass
+
+    @property
+    def node_count(self) -> int:
+        """Nodes of a chain between vehicle and load; 0 for another cable."""
+        return self.cable.segments - 1 if self.cable.is_chain else 0
 
     @property
     def hover_length(self) -> float:
@@ -268,7 +296,8 @@ class Vehicle(Section):
         if not self.cable.is_linear:
             strain = cable_law(self).strain(self.load.mass * self.gravity)
             return self.cable.rest_length * (1.0 + strain)
-        return self.cable.rest_length + self.load.mass * self.gravity / self.cable.stiffness
+        pulling = self.load.mass + 0.5 * self.cable_mass  # on average, along a chain
+        return self.cable.rest_length + pulling * self.gravity / self.cable.stiffness
 
     @property
     def initial_vehicle_position(self) -> Vector:

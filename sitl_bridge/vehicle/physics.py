@@ -14,6 +14,7 @@ import numpy as np
 
 from sitl_bridge.ids import ACTUATOR_CONTROLS, HOIST_CONTROLS
 from sitl_bridge.vehicle.cable_law import cable_law, linear_cable
+from sitl_bridge.vehicle.chain import chain_rate
 from sitl_bridge.vehicle.rotors import full_thrust, rotor_effect
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ FASTEST_MODE = 25e3
 """1/s: a faster cable or ground contact is integrated in steps below 10 microseconds."""
 FASTEST_DRAG = 1e3
 """1/s: drag that stops a body faster is not resolved by the integration's longest step, 1 ms."""
+FASTEST_CHAIN = 1e5
+"""1/s, of the modes within a chain: integrated in steps of 10 microseconds."""
 LONGEST_START = 2.0
 """Cable lengths in hover: at most so long is the cable at the start."""
 
@@ -180,6 +183,16 @@ def _rope(vehicle: Vehicle, weight: float) -> Found:
             f"cable.{key}",
             f"cable.{key} = {value}: the cable bears {bears:.4g} N and the load weighs {weight:.4g} N; "
             "expected a stronger cable",
+        )
+
+
+def _chain(vehicle: Vehicle) -> Found:
+    rate = chain_rate(vehicle)
+    if rate > FASTEST_CHAIN:
+        yield _fault(
+            "cable.segments",
+            f"cable.segments = {vehicle.cable.segments}: they move at {rate:.2g} 1/s, too fast to simulate; "
+            f"expected up to {FASTEST_CHAIN:g} 1/s: fewer, heavier, softer or less damped ones",
         )
 
 
@@ -338,11 +351,12 @@ def _start(vehicle: Vehicle) -> Found:
 
 CHECKS: dict[Callable[[Vehicle], Found], tuple[str, ...]] = {
     _inertia: ("airframe",),
-    _thrust: ("airframe", "load", "rotors", "gravity"),
+    _thrust: ("airframe", "cable", "load", "rotors", "gravity"),
     _steering: ("rotors",),
     _hoist: ("gripper", "rotors", "winch"),
     _cable: ("cable", "load", "gravity"),
-    _cable_rate: ("cable", "load", "airframe"),
+    _cable_rate: ("cable", "load", "airframe", "gravity"),
+    _chain: ("cable", "load"),
     _drag: ("airframe",),
     _drag_of_load: ("load",),
     _legs: ("airframe", "ground"),

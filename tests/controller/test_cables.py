@@ -1,4 +1,4 @@
-"""Any vehicle on a rope of any material: the law that is designed on what the rope acts as flies it."""
+"""Any vehicle on any cable: the law that is designed on what the cable acts as flies it."""
 
 import pytest
 
@@ -11,7 +11,11 @@ from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.closed_loop import fly
 
 RATE = 250.0
+CHAIN = "chain"
 HANDFUL = [
+    ("paper", CHAIN),
+    ("iris", CHAIN),
+    ("heavy", CHAIN),
     ("paper", "nylon"),
     ("paper", "dyneema"),
     ("paper", "rubber"),
@@ -19,15 +23,18 @@ HANDFUL = [
     ("iris", "rubber"),
     ("heavy", "nylon"),
 ]
-flown = pytest.mark.parametrize(("name", "material"), HANDFUL)
+flown = pytest.mark.parametrize(("name", "cable"), HANDFUL)
 
 
-def on_rope(name: str, material: str) -> Vehicle:
+def on_cable(name: str, cable: str) -> Vehicle:
     return load_vehicle(
         name,
         [
-            "cable.model=progressive",
-            f"cable.material={material}",
+            *(
+                ["cable.model=chain"]
+                if cable == CHAIN
+                else ["cable.model=progressive", f"cable.material={cable}"]
+            ),
             "initial.start=hover",
             "initial.load_position=[0, 0, 20]",
         ],
@@ -35,8 +42,8 @@ def on_rope(name: str, material: str) -> Vehicle:
 
 
 @flown
-def test_a_set_point_is_reached(name: str, material: str) -> None:
-    vehicle = on_rope(name, material)
+def test_a_set_point_is_reached(name: str, cable: str) -> None:
+    vehicle = on_cable(name, cable)
     start = vehicle.initial_load_position
     path = planned(setpoint((3.0, 3.0, 24.0), start), vehicle)
     flight = fly(vehicle, design("default", vehicle, RATE), path, float(path["ramp_time"][0]) + 12.0, RATE)
@@ -48,8 +55,8 @@ def test_a_set_point_is_reached(name: str, material: str) -> None:
 
 
 @flown
-def test_a_circle_is_followed(name: str, material: str) -> None:
-    vehicle = on_rope(name, material)
+def test_a_circle_is_followed(name: str, cable: str) -> None:
+    vehicle = on_cable(name, cable)
     start = vehicle.initial_load_position
     path = planned(circle((0.0, 0.0, 20.0), 5.0, 0.5, start), vehicle)
     flight = fly(vehicle, design("default", vehicle, RATE), path, float(path["ramp_time"][0]) + 20.0, RATE)
@@ -57,7 +64,7 @@ def test_a_circle_is_followed(name: str, material: str) -> None:
 
 
 def test_the_controller_is_told_a_linear_cable_that_hangs_as_long() -> None:
-    vehicle = on_rope("iris", "nylon")
+    vehicle = on_cable("iris", "nylon")
     told = linearised(vehicle)
     assert told.cable.model == "tension-only"
     assert told.hover_length == pytest.approx(vehicle.hover_length, rel=1e-12)
@@ -65,3 +72,12 @@ def test_the_controller_is_told_a_linear_cable_that_hangs_as_long() -> None:
     assert linearised(told) is told
     paper = load_vehicle("paper")
     assert linear_cable(paper) is paper.cable
+
+
+def test_vehicle_and_load_are_told_to_carry_half_a_chain_each() -> None:
+    vehicle = on_cable("heavy", CHAIN)
+    told = linearised(vehicle)
+    assert told.hover_thrust == pytest.approx(vehicle.hover_thrust, rel=1e-12)
+    assert told.hover_length == pytest.approx(vehicle.hover_length, rel=1e-12)
+    assert told.load.mass == pytest.approx(1.05 * vehicle.load.mass)
+    assert told.cable_mass == 0.0

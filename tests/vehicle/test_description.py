@@ -85,7 +85,10 @@ def test_file_by_path_reads_as_the_shipped_one(tmp_path: Path, paper: Vehicle) -
         ("rotors=3", ["rotors = 3", "not a list", "4 to 16 tables"]),
         ("rotors.0=3", ["rotors.0 = 3", "not a table"]),
         ("cable=3", ["cable = 3", "a table"]),
-        ("cable.model=rope", ["cable.model = 'rope'", "two-way or tension-only or linear or progressive"]),
+        (
+            "cable.model=rope",
+            ["cable.model = 'rope'", "two-way or tension-only or linear or progressive or chain"],
+        ),
         ("cable.rest_length=true", ["cable.rest_length = True m", "number", "> 0 and <= 1000"]),
         ('cable.rest_length="10"', ["cable.rest_length = '10' m", "number"]),
         (f"cable.rest_length={'9' * 5000}", ["cable.rest_length = '99", "... m", "<= 1000"]),

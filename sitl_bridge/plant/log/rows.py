@@ -9,23 +9,36 @@ from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
 from sitl_bridge.plant.physics.cable import span, tension_of
+from sitl_bridge.plant.physics.chain import NODE_STATES
+from sitl_bridge.plant.physics.flexible_cable import CHAIN
 from sitl_bridge.plant.physics.parameters import PARAMETERS
-from sitl_bridge.plant.physics.state import COLUMNS, INNER_SIZE, MOST_ROTORS, STATE_SIZE, Array
+from sitl_bridge.plant.physics.state import (
+    CABLE_STATE,
+    COLUMNS,
+    INNER_SIZE,
+    MOST_ROTORS,
+    STATE_SIZE,
+    Array,
+)
+from sitl_bridge.vehicle.chain import MOST_SEGMENTS
 
 CHUNK_ROWS = 4096
 """Rows that are kept before they are written out."""
 
+MOST_NODES = MOST_SEGMENTS - 1
 _TIME, _STATE, _LENGTH, _TENSION = 0, 1, 1 + STATE_SIZE, 2 + STATE_SIZE
 _ROTORS = _TENSION + 1
 _FORCE = _ROTORS + MOST_ROTORS
-WIDTH = _FORCE + 6
+_NODES = _FORCE + 6
+WIDTH = _NODES + 3 * MOST_NODES
 
 
-def columns(rotor_count: int) -> list[str]:
-    """Names of the log's columns, with their units."""
+def columns(rotor_count: int, node_count: int = 0) -> list[str]:
+    """Names of the log's columns, with their units. node_count: of a chain, from the top."""
     forces = [f"force_{body}_{axis}_N" for body in ("vehicle", "load") for axis in "xyz"]
     rotors = [f"rotor_{i + 1}_rad_s" for i in range(rotor_count)]
-    return ["time_s", *COLUMNS, "cable_length_m", "cable_tension_N", *rotors, *forces]
+    nodes = [f"node_{i + 1}_{axis}_m" for i in range(node_count) for axis in "xyz"]
+    return ["time_s", *COLUMNS, "cable_length_m", "cable_tension_N", *rotors, *forces, *nodes]
 
 
 @entry_point(
@@ -59,9 +72,13 @@ def fill_row(
         row[_ROTORS + i] = inner[i] if p.time_constant[i] > 0.0 else command[i]
     for i in range(6):
         row[_FORCE + i] = force[i]
+    if p.cable_kind == CHAIN:
+        for node in range(p.segments - 1):
+            for i in range(3):
+                row[_NODES + 3 * node + i] = inner[CABLE_STATE + NODE_STATES * node + i]
     return index + 1
 
 
-def kept_columns(rotor_count: int) -> NDArray[np.int64]:
-    """Which elements of a row belong to `columns`: those of rotors that do not exist are left out."""
-    return np.array([*range(_ROTORS + rotor_count), *range(_FORCE, WIDTH)])
+def kept_columns(rotor_count: int, node_count: int = 0) -> NDArray[np.int64]:
+    """Which elements of a row belong to `columns`: without those of rotors and nodes that do not exist."""
+    return np.array([*range(_ROTORS + rotor_count), *range(_FORCE, _NODES + 3 * node_count)])

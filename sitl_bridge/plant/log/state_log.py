@@ -25,8 +25,8 @@ class StateLog:
         """Rows that are not written out yet; a compiled tick fills the next one itself, see `took_row`."""
         self.count = 0
         """How many there are; always fewer than fit."""
-        self._log = RowLog(path, columns(len(world.vehicle.rotors)))
-        self._keep = kept_columns(len(world.vehicle.rotors))
+        self._log = RowLog(path, columns(len(world.vehicle.rotors), world.vehicle.node_count))
+        self._keep = kept_columns(len(world.vehicle.rotors), world.vehicle.node_count)
         self._fill = fill_row.bind(*world.log_sources(), self.table)
 
     def record(self, time_s: float, world: World) -> None:

@@ -8,10 +8,10 @@ Taut or slack is decided between steps and held within one: within a step the fo
 function of the state, and the sign of `taut_margin_of` says when the other one holds. Where the sign
 changes, the step is split at that instant, so that the integrator keeps its order through snatches.
 
-A progressive cable is one of `flexible_cable`: it has states of its own, and its force is continuous where
-it goes slack.
+A progressive cable and a chain are of `flexible_cable`: they have states of their own, and their force is
+continuous where they go slack.
 
-Arguments: p, parameter record; x, state (19,); inner, inner state (41,); see `state`.
+Arguments: p, parameter record; x, state (19,); inner, inner state (149,); see `state`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from __future__ import annotations
 from typing import Any
 
 from sitl_bridge.compiled import kernel
-from sitl_bridge.plant.physics.flexible_cable import LINEAR, PROGRESSIVE, progressive_tension
+from sitl_bridge.plant.physics.chain import chain_tension
+from sitl_bridge.plant.physics.flexible_cable import CHAIN, LINEAR, PROGRESSIVE, progressive_tension
 from sitl_bridge.plant.physics.state import CABLE_HOLDS, CABLE_STATE, Array
 
 
@@ -110,6 +111,8 @@ def tension_of(p: Any, x: Array, inner: Array) -> float:
     length, rate = stretch(x)
     if p.cable_kind == PROGRESSIVE:
         return float(progressive_tension(p, length / p.rest_length - 1.0, inner, CABLE_STATE))
+    if p.cable_kind == CHAIN:
+        return float(chain_tension(p, x, inner, CABLE_STATE))
     return float(tension(p, length, rate))
 
 

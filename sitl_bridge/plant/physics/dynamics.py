@@ -68,7 +68,7 @@ def state_derivative(
 ) -> None:
     """Time derivative of the state.
 
-    p: parameter record; x: state (19,), see `state`; inner: inner state (41,), of which anchors are read;
+    p: parameter record; x: state (19,), see `state`; inner: inner state (149,), of which anchors are read;
     wrench: of the rotors; cable_taut: whether the cable exerts its force; force: (6,) external force on
     vehicle and on load, N, world; wind: (6,) air velocity at vehicle and at load, m/s, world; ground: (7,) or
     more, scratch; out: (19,), written.

@@ -1,10 +1,10 @@
-"""A cable with states of its own: a rope of a material, whose strain relaxes. See `vehicle.cable_law`.
+"""A cable with states of its own: a chain, or a rope of a material, whose strain relaxes.
 
 The states follow those of the bodies in an extended state, and integrate with them.
 
-A rope's material may be longer than the way from vehicle to load: it is then slack, and relaxes under no
-force. Its strain e is the larger of the geometric one and the one without tension. So the tension is
-continuous, never negative, and a cycle never gives energy.
+A rope's law is that of `vehicle.cable_law`. Its material may be longer than the way from vehicle to load: it
+is then slack, and relaxes under no force. Its strain e is the larger of the geometric one and the one without
+tension. So the tension is continuous, never negative, and a cycle never gives energy.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ import math
 from typing import Any
 
 from sitl_bridge.compiled import kernel
+from sitl_bridge.plant.physics.chain import chain
 from sitl_bridge.plant.physics.state import STATE_SIZE, Array
 from sitl_bridge.vehicle.cable_law import BRANCHES
 
-LINEAR, PROGRESSIVE = 0, 1
-"""Kinds of cable: the spring and damper of `cable`, a rope of a material."""
+LINEAR, PROGRESSIVE, CHAIN = 0, 1, 2
+"""Kinds of cable: the spring and damper of `cable`, a rope of a material, `chain`."""
 
 
 @kernel
@@ -58,6 +59,15 @@ def flexible_cable(
     """
     for i in range(6):
         acting[i] = force[i]
+    if p.cable_kind == CHAIN:
+        chain(p, extended, holds, wind, rate, acting)
+    else:
+        rope(p, extended, holds, rate, acting)
+
+
+@kernel
+def rope(p: Any, extended: Array, holds: bool, rate: Array, acting: Array) -> None:
+    """Add a rope's forces on the bodies to `acting`, and write the rates of its relaxed strains."""
     dx, dy, dz = extended[13] - extended[0], extended[14] - extended[1], extended[15] - extended[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     strain = length / p.rest_length - 1.0

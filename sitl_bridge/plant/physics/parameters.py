@@ -7,11 +7,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.physics.flexible_cable import LINEAR, PROGRESSIVE
+from sitl_bridge.plant.physics.chain import NODE_STATES
+from sitl_bridge.plant.physics.flexible_cable import CHAIN, LINEAR, PROGRESSIVE
 from sitl_bridge.plant.physics.ground import contact, leg_reach
 from sitl_bridge.plant.physics.hoist import HOIST, hoist
 from sitl_bridge.plant.physics.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
 from sitl_bridge.vehicle.cable_law import BRANCH_SPEEDS, BRANCHES, bounce_rate, branches, cable_law
+from sitl_bridge.vehicle.chain import chain_rate, end_mass, segment_drag
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.physics import mode_rate
 
@@ -31,6 +33,9 @@ PARAMETERS = np.dtype(
         ("cable_states", "i8"),  # that it adds to the inner state
         ("curve_scale", "f8"),  # N, of the static curve, see `cable_law`
         ("curve_rate", "f8"),
+        ("segments", "i8"),  # of a chain
+        ("segment_mass", "f8"),
+        ("segment_drag", "f8"),  # N s²/m², across it
         ("branch_weight", "f8", BRANCHES),
         ("branch_rate", "f8", BRANCHES),  # 1/s
         ("has_lag", "b1"),
@@ -92,6 +97,8 @@ def parameters(vehicle: Vehicle) -> Parameters:
     p["cable_kind"] = LINEAR
     if not vehicle.cable.is_linear:
         _fill_progressive(p, vehicle)
+    if vehicle.cable.is_chain:
+        _fill_chain(p, vehicle)
     p["rotor_count"] = len(vehicle.rotors)
     for index, rotor in enumerate(vehicle.rotors):
         p["rotor_x"][index], p["rotor_y"][index], _ = rotor.position
@@ -116,6 +123,15 @@ def _fill_progressive(p: np.void, vehicle: Vehicle) -> None:
     p["branch_weight"] = branches(law.loss_factor).weights
     p["branch_rate"] = bounce_rate(vehicle, law) * BRANCH_SPEEDS
     p["breaking_tension"] = vehicle.cable.breaking_tension or law.breaking_load
+
+
+def _fill_chain(p: np.void, vehicle: Vehicle) -> None:
+    p["cable_kind"], p["segments"] = CHAIN, vehicle.cable.segments
+    p["cable_states"] = NODE_STATES * (vehicle.cable.segments - 1)
+    p["segment_mass"] = vehicle.cable_mass / vehicle.cable.segments
+    p["segment_drag"] = segment_drag(vehicle)
+    p["vehicle_mass"] += end_mass(vehicle)
+    p["load_mass"] += end_mass(vehicle)
 
 
 def _fill_ground(p: np.void, vehicle: Vehicle) -> None:
@@ -166,7 +182,8 @@ def fastest_rate(vehicle: Vehicle, lightest_load: float | None = None) -> float:
             )
             squares.append(stiffness * arms / inertia)
         modes += [(square, square * damping / stiffness) for square in squares]
-    return max(mode_rate(square, double) for square, double in modes)
+    fastest = max(mode_rate(square, double) for square, double in modes)
+    return max(fastest, chain_rate(vehicle) * STEP_TIMES_RATE / CHAIN_STEP_TIMES_RATE)
 
 
 def _stiffest(vehicle: Vehicle) -> float:
@@ -181,6 +198,9 @@ LONGEST_STEP = 1e-3
 STEP_TIMES_RATE = 0.25
 """Largest step times fastest rate: RK4 is then wrong by 1e-5 a radian, and has a tenfold reserve of
 stability."""
+
+CHAIN_STEP_TIMES_RATE = 1.0
+"""The same for the modes within a chain: stable up to 2.7, and the fastest are artefacts of the segments."""
 
 
 def step_count(vehicle: Vehicle, duration: float, lightest_load: float | None = None) -> int:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sitl_bridge.frames import quaternion_from_euler, rotate
 from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.vehicle.cable_law import BRANCHES
+from sitl_bridge.vehicle.chain import MOST_SEGMENTS, node_shares
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 
 Array = NDArray[np.float64]
@@ -53,7 +54,7 @@ CABLE_HOLDS = ANCHOR_NORTH + CONTACTS
 """1 while the cable joins vehicle and load, 0 once it has broken or let go."""
 CABLE_STATE = CABLE_HOLDS + 1
 """The first of what a cable remembers that is more than a spring and damper, see `flexible_cable`."""
-MOST_CABLE_STATES = 6
+MOST_CABLE_STATES = 6 * (MOST_SEGMENTS - 1)
 INNER_SIZE = CABLE_STATE + MOST_CABLE_STATES
 
 SPECIFIC_FORCE = slice(0, 3)
@@ -82,7 +83,7 @@ def initial_state(vehicle: Vehicle) -> Array:
 
 
 def initial_inner_state(vehicle: Vehicle) -> Array:
-    """The inner state (41,) at the start: rotors at hover speed in the air and still on the ground."""
+    """The inner state (149,) at the start: rotors at hover speed in the air and still on the ground."""
     inner = np.zeros(INNER_SIZE)
     if vehicle.initial.start == "hover":
         inner[: len(vehicle.rotors)] = hover_rotor_speeds(vehicle)
@@ -96,4 +97,11 @@ def initial_inner_state(vehicle: Vehicle) -> Array:
     if not vehicle.cable.is_linear:  # it has relaxed
         strain = vehicle.initial_length / vehicle.cable.rest_length - 1.0
         inner[CABLE_STATE : CABLE_STATE + BRANCHES] = max(strain, 0.0)
+    if vehicle.cable.is_chain:
+        top, bottom = np.array(vehicle.initial_vehicle_position), np.array(vehicle.initial_load_position)
+        for index, share in enumerate(node_shares(vehicle)):
+            first = CABLE_STATE + 6 * index
+            inner[first : first + 3] = top + share * (bottom - top)
+            inner[first + 3 : first + 6] = np.array(vehicle.initial.vehicle_velocity) * (1.0 - share)
+            inner[first + 3 : first + 6] += np.array(vehicle.initial.load_velocity) * share
     return inner

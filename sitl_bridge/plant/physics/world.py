@@ -37,6 +37,7 @@ from sitl_bridge.plant.sensors.instruments import Instruments
 from sitl_bridge.plant.sensors.tracker import LoadTracker
 from sitl_bridge.plant.sensors.truth import measure
 from sitl_bridge.plant.stages import EVER
+from sitl_bridge.vehicle.chain import end_mass
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 
 
@@ -214,7 +215,8 @@ class World:
 
     def set_load_mass(self, mass: float | None) -> None:
         """Change the load's mass, kg; None: as described."""
-        self._parameters["load_mass"] = self.vehicle.load.mass if mass is None else mass
+        mass = self.vehicle.load.mass if mass is None else mass
+        self._parameters["load_mass"] = mass + end_mass(self.vehicle)
 
     def log_sources(self) -> tuple[NDArray[Any], Array, Array, Array, Array]:
         """Parameter record, state, inner state, commands and force as they change, for a log to read."""
