@@ -17,6 +17,7 @@ from sitl_bridge.vehicle.schema import Vector
 
 # Where pydantic's words are those of Python and not of TOML.
 _PROBLEMS = {
+    "literal_error": "no such value",
     "tuple_type": "not a list",
     "model_type": "not a table",
     "model_attributes_type": "not a table",
