@@ -6,11 +6,11 @@ import gc
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from controller.design.names import ON_ESTIMATE
 from controller.feedback.truth import Feedback, PathFrom, estimates
-from controller.hil.session import HilSession, new_session
+from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import AwakeClock
 from sitl_bridge.mavlink.links import Address, Link, open_link
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from controller.feedback.assessment import Assessor
     from controller.feedback.log import EstimateLog
     from controller.law.state import Array
+    from controller.own_law.find import ChosenLaw
+    from controller.own_law.pilot import OwnLawPilot
     from controller.pilot.ground_link import GroundOptions
     from controller.pilot.ground_session import Guided
 
@@ -46,6 +48,18 @@ class ControllerOptions:
     feedback: str = "truth"
     out: Path | None = None
     """Where the estimate's log goes."""
+    law: ChosenLaw | None = None
+    """A law of the user's own, instead of the design."""
+
+
+class Session(NamedTuple):
+    """The autopilot's side of the HIL link without the link; the caller closes log and guided."""
+
+    hil: HilSession
+    log: EstimateLog | None
+    guided: Guided | None
+    """What ground control needs of it."""
+    own_law: OwnLawPilot | None
 
 
 def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
@@ -56,34 +70,44 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     link = open_link(options.hil, speaker.say)
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
-    session, log, guided = open_session(options, speaker)
+    session = open_session(options, speaker)
+    own_law = session.own_law
+    flies = f"{options.design} design" if options.law is None else f"law {options.law.name}"
     speaker.say(
-        f"{options.vehicle.name}, {options.design} design on {options.feedback} at {options.rate_hz:g} Hz, "
+        f"{options.vehicle.name}, {flies} on {options.feedback} at {options.rate_hz:g} Hz, "
         f"waiting for a plant on {options.hil} (system {options.instance + 1})"
     )
     most_steps = None if options.duration_s is None else round(options.duration_s * options.rate_hz)
     try:
-        _loop(session, link, most_steps, stop, guided, speaker)
+        _loop(session, link, most_steps, stop, speaker)
     finally:
-        if guided is not None:
-            guided.close()
+        if session.guided is not None:
+            session.guided.close()
         link.close()
-        if log is not None:
-            log.close()
+        if session.log is not None:
+            session.log.close()
+    failure = own_law.failure if own_law is not None else None
+    if failure is not None:
+        speaker.say(str(failure))
     if stop:
         speaker.say(f"stopped by {stop.reason}")
-    outcome = {"stopped_by": stop.reason, "control_steps": session.steps}
+    outcome = {
+        "stopped_by": stop.reason,
+        "control_steps": session.hil.steps,
+        "law": None if own_law is None else own_law.cost,
+        "failure": None if failure is None else str(failure),
+    }
     speaker.event("end", **outcome)
     return outcome
 
 
-def open_session(
-    options: ControllerOptions, speaker: Speaker
-) -> tuple[HilSession, EstimateLog | None, Guided | None]:
-    """The autopilot's side of the HIL link without the link, its log, and what ground control needs of it.
+def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
+    """A session with the autopilot, feedback and log that the options ask for.
 
-    The caller closes what is not None. Whatever the cable is, the controller takes it for the linear one that
+    Whatever the cable is, the controller takes it for the linear one that
     it acts as about hover.
+
+    Raises DescriptionError for a law of the user's own that cannot be flown.
     """
     options = replace(options, vehicle=linearised(options.vehicle))
     log: EstimateLog | None = None
@@ -100,13 +124,22 @@ def open_session(
         from controller.pilot.ground_session import Guided
 
         guided = Guided(options.vehicle, rate, instance, _ground(options), say, assessor)
-        return new_session(guided.autopilot, instance, say, feedback, rate), log, guided
+        return Session(new_session(guided.autopilot, instance, say, feedback, rate), log, guided, None)
     path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
 
-    def autopilot(controls: Array) -> Autopilot:
-        return Autopilot(options.vehicle, design, rate, path_from, controls)
+    own_law: OwnLawPilot | None = None
 
-    return new_session(autopilot, instance, say, feedback, rate), log, None
+    def autopilot(controls: Array) -> Pilot:
+        nonlocal own_law
+        if options.law is None:
+            return Autopilot(options.vehicle, design, rate, path_from, controls)
+        from controller.own_law.pilot import OwnLawPilot
+
+        own_law = OwnLawPilot(options.law, options.vehicle, rate, path_from, controls)
+        return own_law
+
+    hil = new_session(autopilot, instance, say, feedback, rate)
+    return Session(hil, log, None, own_law)
 
 
 def _ground(options: ControllerOptions) -> GroundOptions:
@@ -142,13 +175,13 @@ def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedbac
 
 
 def _loop(
-    session: HilSession,
+    opened: Session,
     link: Link,
     most_steps: int | None,
     stop: StopRequest,
-    guided: Guided | None,
     speaker: Speaker,
 ) -> None:
+    session, guided, own_law = opened.hil, opened.guided, opened.own_law
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     clock = AwakeClock(time.monotonic())
     now = time.monotonic()
@@ -166,6 +199,8 @@ def _loop(
             session.receive(received, now)
         for datagram in session.to_send(now):
             link.send(datagram)
+        if own_law is not None and own_law.failure is not None:  # the plant has been told: rotors stopped
+            return
         if guided is not None:  # after the answer: the plant does not wait for ground control
             guided.exchange(now, heard=received is not None)
             for datagram in guided.to_plant(now):

@@ -6,7 +6,7 @@ state: flights may run side by side in threads or processes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.law.reference import Path as ReferencePath
+from controller.own_law.find import choose
+from controller.own_law.interface import OwnLaw
 from sitl.flights.in_process import InProcessFlight, fly_in_process
 from sitl.flights.metrics import flight_metrics, reference_positions
 from sitl.flights.outcome import judge
@@ -79,6 +81,7 @@ def fly(
     plant_overrides: Sequence[str] = (),
     seed: int = 0,
     design: str = "default",
+    law: str | Callable[..., OwnLaw] | None = None,
     feedback: str | None = None,
     rate_hz: float = 250.0,
     duration_s: float | None = None,
@@ -88,10 +91,12 @@ def fly(
 
     scenario: a shipped name, a .toml file, or a `Scenario`. vehicle: a shipped name, a .toml file, or a
     complete `Vehicle`; by default the scenario's. overrides: `KEY=VALUE` as for `--set`. plant_overrides: the
-    same, but the controller is not told. feedback: `truth` or `estimate`, by default as for `sitl fly`. out:
-    a folder for all that `sitl fly` leaves; by default nothing is written.
+    same, but the controller is not told. law: a class of one's own instead of the design, see
+    `controller.own_law.interface`, or its name as for `--law`. feedback: `truth` or `estimate`, by default as
+    for `sitl fly`. out: a folder for all that `sitl fly` leaves; by default nothing is written.
 
-    Raises DescriptionError, with a line for each fault, for what cannot be flown.
+    Raises DescriptionError, with a line for each fault, for what cannot be flown; LawError when the law
+    fails in flight.
     """
     described = load_scenario(scenario) if isinstance(scenario, str) else scenario
     if isinstance(described.reference, GroundControl):
@@ -102,6 +107,9 @@ def fly(
         raise DescriptionError(str(scenario), ["faults.link takes two processes with a link between them"])
     told, flown = _vehicles(described, vehicle, overrides, plant_overrides)
     check_feasible(described, told, design)
+    chosen = None if law is None else choose(law)
+    if chosen is not None and design != "default":
+        raise DescriptionError("law", [f"instead of a design; leave out design={design!r}"])
     feedback = feedback or usual_feedback(described, told)
     folder = None if out is None else Path(out)
     ended = fly_in_process(
@@ -115,14 +123,18 @@ def fly(
             design=design,
             feedback=feedback,
             faults=checked(described.faults, told),
+            law=chosen,
             out=folder,
         )
     )
+    if ended.law_failure is not None:
+        raise ended.law_failure
     path = described.reference.path(told.initial_load_position)
     facts = {
         "scenario": scenario if isinstance(scenario, str) else described.description,
         "vehicle": told.name,
-        "design": design,
+        "design": design if chosen is None else None,
+        "law": ended.law,
         "feedback": feedback,
         "seed": seed,
         "clock": "lockstep",

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from typing import Any
+from typing import Any, TextIO
 
 FLIGHT_OVER = b"over\n"
 """What a parent writes to a child's standard input when there is nothing more to do."""
@@ -40,9 +40,11 @@ class StopRequest:
 class Speaker:
     """Messages for people go to standard error; events for programs, when asked for, to standard output."""
 
-    def __init__(self, name: str, events: bool) -> None:
+    def __init__(self, name: str, events: bool, stream: TextIO | None = None) -> None:
+        """stream: for events, by default standard output."""
         self._name = name
         self._events = events
+        self._stream = stream
 
     def say(self, text: str) -> None:
         """One line for a person."""
@@ -51,4 +53,4 @@ class Speaker:
     def event(self, kind: str, **fields: Any) -> None:
         """One JSON object on a line of its own, for the program that started this one."""
         if self._events:
-            print(json.dumps({"event": kind, **fields}), flush=True)
+            print(json.dumps({"event": kind, **fields}), file=self._stream, flush=True)

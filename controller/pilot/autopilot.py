@@ -13,9 +13,16 @@ from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation
 from controller.law.control_law import WORK, Law, engaged_memory
 from controller.law.control_step import control_step
+from controller.law.reference import Path
 from controller.law.state import LOAD_POSITION, Array
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle.description import Vehicle
+
+
+def planned_from(path_from: PathFrom, estimate: Array, vehicle: Vehicle) -> Path:
+    """The reference path of a law that takes over at an estimate (18,), as slow as the vehicle needs it."""
+    load = estimate[LOAD_POSITION]
+    return planned(path_from((float(load[0]), float(load[1]), float(load[2]))), vehicle)
 
 
 class Autopilot:
@@ -49,10 +56,9 @@ class Autopilot:
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
         if self._step is None:
-            load = estimate[LOAD_POSITION]
-            path = self._path_from((float(load[0]), float(load[1]), float(load[2])))
-            path = planned(path, self._vehicle)
-            law = (self._design, self._allocation, path, engaged_memory(load), np.zeros(1, dtype=WORK))
+            path = planned_from(self._path_from, estimate, self._vehicle)
+            memory = engaged_memory(estimate[LOAD_POSITION])
+            law = (self._design, self._allocation, path, memory, np.zeros(1, dtype=WORK))
             self._step = control_step.bind(*law, estimate, self._controls)
             self.law = law
             self.armed = True

@@ -20,6 +20,7 @@ from sitl.command_line.completion import add_completion
 from sitl.command_line.doctor import add_doctor
 from sitl.command_line.export import add_export
 from sitl.command_line.identify import add_identify
+from sitl.command_line.own_law import add_law
 from sitl.command_line.sweep import add_sweep
 from sitl.command_line.vehicle import add_vehicle
 from sitl.command_line.view import add_view
@@ -313,6 +314,7 @@ def _control(parser: argparse.ArgumentParser) -> None:
         default="default",
         help="gain design: re-weighted for margins, the paper's integral LQR, or its LQR without integrator",
     )
+    add_law(parser)
     parser.add_argument(
         "--feedback",
         choices=("truth", "estimate"),

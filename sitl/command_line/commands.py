@@ -9,13 +9,14 @@ import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TextIO
 
 from sitl.command_line.arguments import build_parser
 from sitl.command_line.completion import run_completion
 from sitl.command_line.doctor import run_doctor
 from sitl.command_line.export import run_export
 from sitl.command_line.identify import run_identify
+from sitl.command_line.own_law import chosen_law, prints_to_stderr
 from sitl.command_line.sweep import run_sweep
 from sitl.command_line.vehicle import run_vehicle
 from sitl.command_line.view import run_view
@@ -158,17 +159,35 @@ def _plant(arguments: argparse.Namespace) -> int:
 
 def _controller(arguments: argparse.Namespace) -> int:
     vehicle, scenario = _what_to_fly(arguments)
+    with prints_to_stderr(arguments.law is not None) as stream:
+        outcome = _control(arguments, vehicle, scenario, stream)
+    if isinstance(outcome, int):
+        return outcome
+    if arguments.json and not arguments.until_eof:
+        print(json.dumps(outcome, indent=2))
+    return FAILED if outcome["failure"] else 0
+
+
+def _control(
+    arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario | None, events: TextIO
+) -> dict[str, Any] | int:
+    """Run a controller; what there is to report of it, or over a flight stack the exit code."""
     from controller.run import ControllerOptions, run
     from sitl.flights.hold import check_design
     from sitl.flights.refusals import check_feasible
     from sitl.flights.scenario import GroundControl, Hover, usual_feedback
 
+    law = chosen_law(arguments, scenario)
     if arguments.over is not None:
         from sitl.command_line.over import run_over
 
         return run_over(arguments, vehicle, scenario)
     check_feasible(scenario, vehicle, arguments.design)
-    speaker = Speaker("controller", events=arguments.until_eof)
+    if law is not None:
+        from controller.own_law.find import make
+
+        make(law, vehicle, arguments.rate)
+    speaker = Speaker("controller", events=arguments.until_eof, stream=events)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
     reference = scenario.reference if scenario else Hover(kind="hover")
@@ -187,11 +206,9 @@ def _controller(arguments: argparse.Namespace) -> int:
         ground=_ground_options(arguments),
         feedback=arguments.feedback or usual_feedback(scenario, vehicle),
         out=arguments.out,
+        law=law,
     )
-    outcome = run(options, speaker, stop)
-    if arguments.json and not arguments.until_eof:
-        print(json.dumps(outcome, indent=2))
-    return 0
+    return run(options, speaker, stop)
 
 
 def _fly(arguments: argparse.Namespace) -> int:
@@ -203,6 +220,9 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.terminal.summary import table
     from sitl_bridge.mavlink.links import Address
 
+    scenario = load_scenario(arguments.scenario)
+    with prints_to_stderr(arguments.law is not None):
+        law = chosen_law(arguments, scenario)
     if arguments.over is not None:
         from sitl.command_line.over import fly_over_stack
 
@@ -210,7 +230,6 @@ def _fly(arguments: argparse.Namespace) -> int:
         kept = _timing(arguments, AS_PX4_EXPECTS if hil.kind == "tcpin" else Timing("realtime", None))
         return fly_over_stack(arguments, hil, kept, _overrides(arguments), _audience)
     timing = _timing(arguments, Timing("lockstep" if arguments.in_process else "realtime", None))
-    scenario = load_scenario(arguments.scenario)
     options = FlightOptions(
         scenario_name=arguments.scenario,
         scenario=scenario,
@@ -230,6 +249,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         instance=arguments.instance,
         out=arguments.out,
         in_process=arguments.in_process,
+        law=law,
     )
     stop = StopRequest()
     stop.install()
@@ -247,7 +267,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         if failure:
             print(f"fly: {failure}", file=sys.stderr, flush=True)
         return FAILED if failure else 0
-    with _audience(arguments, options.checked_vehicle()) as viewer:
+    with prints_to_stderr(law is not None), _audience(arguments, options.checked_vehicle()) as viewer:
         summary, out = fly(replace(options, truth_to=viewer), stop)
     if arguments.json:
         print(json.dumps(summary, indent=2))

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.feedback.truth import estimates
+from controller.own_law.find import ChosenLaw, make
 from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, watch
 from sitl.flights.refusals import check_feasible
@@ -66,6 +67,8 @@ class FlightOptions:
     """Host and port of a viewer that is shown the truth."""
     in_process: bool = False
     """Plant and controller joined in this process, without sockets."""
+    law: ChosenLaw | None = None
+    """A law of the user's own, instead of the design."""
     ground: Sequence[str] = ()
     """Arguments of the controller for its ground-control links."""
 
@@ -92,6 +95,8 @@ class FlightOptions:
         if self.out is not None:
             plant += ["--out", str(self.out)]
         controller = [*common, "--hil", str(self.other_end), "--design", self.design]
+        if self.law is not None:
+            controller += ["--law", self.law.name]
         if self.feedback is not None:
             controller += ["--feedback", self.feedback]
         if self.out is not None:
@@ -137,6 +142,8 @@ class FlightOptions:
         checked(self.scenario.faults, flown)
         told = scenario_vehicle(self.scenario, self.vehicle, self.overrides)
         check_feasible(self.scenario, told, self.design)
+        if self.law is not None:
+            make(self.law, told, self.rate_hz)
         return told
 
 
@@ -174,6 +181,7 @@ def _fly_here(
             feedback=options.feedback or usual_feedback(scenario, told),
             instance=options.instance,
             faults=checked(scenario.faults, told),
+            law=options.law,
             out=options.out,
         ),
         stop,
@@ -183,7 +191,13 @@ def _fly_here(
     failure = ended.account.pop("failure")
     stopped = f"stopped by {stop.reason}" if stop else None
     given_up = f"the plant gave up: {failure}" if failure else None
-    return Outcome(end=ended.account, failure=stopped or given_up, first_command_unix_s=ended.began_at)
+    of_law = str(ended.law_failure) if ended.law_failure is not None else None
+    return Outcome(
+        end=ended.account,
+        failure=of_law or stopped or given_up,
+        first_command_unix_s=ended.began_at,
+        law=ended.law,
+    )
 
 
 def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path]:
@@ -231,7 +245,8 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     facts = {
         "scenario": options.scenario_name,
         "vehicle": vehicle.name,
-        "design": options.design,
+        "design": options.design if options.law is None else None,
+        "law": outcome.law,
         "feedback": feedback,
         "seed": options.seed,
         "clock": options.clock,

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.feedback.truth import PathFrom
-from controller.run import ControllerOptions, open_session
+from controller.own_law.find import ChosenLaw
+from controller.own_law.interface import LawError
+from controller.run import ControllerOptions, Session, open_session
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import TlogWriter
@@ -56,6 +58,8 @@ class InProcessFlight:
     feedback: str = "truth"
     instance: int = 0
     faults: Faults = NO_FAULTS
+    law: ChosenLaw | None = None
+    """A law of the user's own, instead of the design."""
     out: Path | None = None
     """Where logs go; None: they are kept in memory."""
 
@@ -74,6 +78,10 @@ class Ended:
     """Unix time, s, of the first armed answer; None: it never came."""
     said: list[str] = field(default_factory=list)
     """What plant and controller had to say."""
+    law: dict[str, Any] | None = None
+    """Name and cost of the user's own law, see `OwnLawPilot.cost`."""
+    law_failure: LawError | None = None
+    """Why it could not go on."""
 
 
 class MemoryLog:
@@ -142,7 +150,7 @@ def fly_in_process(
         recorder = StateLog(flight.out / FILE_NAME, simulation.world)
         tlog = TlogWriter(flight.out / TLOG_NAME)
     simulation.record_with(recorder)
-    session, estimates, _ = open_session(_controller_options(flight), speaker)
+    session = open_session(_controller_options(flight), speaker)
     clock = Lockstep(simulation, Notices(speaker.say), flight.instance)
     failure = None
     try:
@@ -150,14 +158,16 @@ def fly_in_process(
     except Diverged as error:
         failure = str(error)
     finally:
-        if estimates is not None:
-            estimates.close()
+        if session.log is not None:
+            session.log.close()
         if tlog is not None:
             tlog.close()
         if isinstance(recorder, StateLog):
             recorder.close()
     ended = Ended(_account(flight, simulation, began, stop, failure), said=said)
     ended.began_at = began[1] if began else None
+    if session.own_law is not None:
+        ended.law, ended.law_failure = session.own_law.cost, session.own_law.failure
     if isinstance(recorder, MemoryLog):
         ended.states, ended.names = recorder.rows(), recorder.names
     return ended
@@ -165,13 +175,13 @@ def fly_in_process(
 
 def _loop(
     clock: Lockstep,
-    session: Any,
+    opened: Session,
     tlog: TlogWriter | None,
     stop: StopRequest | None,
     report: Callable[[], None],
 ) -> None:
     """Datagrams go straight from one object to the other; virtual time is the plant's."""
-    simulation = clock.simulation
+    simulation, session, own_law = clock.simulation, opened.hil, opened.own_law
     now, waited, left = 0.0, 0, PROGRESS_EVERY
     epoch = time.time()
     clock.start(now)
@@ -184,6 +194,8 @@ def _loop(
             if tlog is not None:
                 tlog.write(answer, epoch + now)
             clock.receive(answer, now)
+        if own_law is not None and own_law.failure is not None:
+            return
         now = max(now + 1e-6, clock.next_deadline())
         left -= 1
         if left == 0:
@@ -219,6 +231,7 @@ def _controller_options(flight: InProcessFlight) -> ControllerOptions:
         seed=flight.seed,
         feedback=flight.feedback,
         out=flight.out,
+        law=flight.law,
     )
 
 

@@ -35,6 +35,8 @@ class Outcome:
     """What went wrong, in one line."""
     first_command_unix_s: float | None = None
     launch_to_first_command_s: float | None = None
+    law: dict[str, Any] | None = None
+    """Name and cost of the user's own law, see `OwnLawPilot.cost`."""
     mode: str | None = None
     """The last one that the controller told of, under ground control."""
 
@@ -122,7 +124,7 @@ def watch(pair: Pair, stop: StopRequest, show: Callable[[dict[str, Any]], None])
                         break
                     others = "plant" if name == "controller" else "controller"
                     ending = how_it_ended(pair.processes[name])
-                    outcome.failure = f"the {name} {ending}; the {others} was stopped"
+                    outcome.failure = outcome.failure or f"the {name} {ending}; the {others} was stopped"
                     break
             if outcome.end and not stop:
                 pair.finish()
@@ -166,6 +168,9 @@ def _take(
         outcome.launch_to_first_command_s = event["unix_time_s"] - pair.launched_at
     elif kind == "progress":
         show({**event, "mode": outcome.mode})
+    elif kind == "end" and name == "controller":
+        outcome.law = event.get("law")
+        outcome.failure = event.get("failure") or outcome.failure
     elif kind == "end" and name == "plant":
         if failure := event.pop("failure"):
             outcome.failure = f"the plant gave up: {failure}"

@@ -44,6 +44,7 @@ OF_THE_PLANT = tuple(
 PROMISED = (
     *OF_THE_PLANT,
     *Metrics.__annotations__,
+    "law",
     "outcome",
     "outcome_time_s",
     "outcome_cause",
@@ -172,8 +173,9 @@ def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, 
     axes[4].set_xlabel("time [s]")
     for ax in axes:
         ax.grid(alpha=0.3)
+    flies = f"law {facts['law']['name']}" if facts.get("law") else f"{facts['design']} design"
     figure.suptitle(
-        f"{facts['scenario']}: vehicle {facts['vehicle']}, {facts['design']} design, "
+        f"{facts['scenario']}: vehicle {facts['vehicle']}, {flies}, "
         f"{facts['clock']} at {facts['rate_hz']:g} Hz"
     )
     figure.savefig(file, dpi=110)

@@ -20,6 +20,7 @@ def table(summary: dict[str, Any], width: int = 1000) -> str:
     rows = [
         ("outcome", _outcome(summary)),
         *(_motion(summary) if is_complete(summary) else _until(summary)),
+        ("own law, a tick", _cost(summary.get("law") or {})),
         ("real-time factor", _with_unit(summary.get("real_time_factor"), "", 2)),
         ("lateness p50 / p99 / max", _lateness(summary.get("lateness_us") or {})),
         ("late ticks", _with_unit(summary.get("late_ticks"), "", 0)),
@@ -77,6 +78,12 @@ def _scaled(value: float | None, factor: float) -> float | None:
 
 def _with_unit(value: float | None, unit: str, digits: int) -> str:
     return "" if value is None else f"{value:.{digits}f} {unit}".rstrip()
+
+
+def _cost(law: dict[str, Any]) -> str:
+    if law.get("mean_us") is None:
+        return ""
+    return f"{law['mean_us']:.1f} us mean, {law['worst_us']:.0f} us worst"
 
 
 def _lateness(lateness: dict[str, float | None]) -> str:
