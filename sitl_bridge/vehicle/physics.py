@@ -157,6 +157,13 @@ def _cable(vehicle: Vehicle) -> Found:
     if not cable.is_linear:
         yield from _rope(vehicle, weight)
         return
+    for key in ("material", "diameter", "loss_factor"):
+        if getattr(cable, key) is not None:
+            yield _fault(
+                f"cable.{key}",
+                f"cable.{key} = {getattr(cable, key)}: goes with cable.model = 'progressive' only; "
+                f"cable.model is '{cable.model}'",
+            )
     if cable.breaking_tension is not None and cable.breaking_tension <= weight:
         yield _fault(
             "cable.breaking_tension",

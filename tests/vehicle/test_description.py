@@ -85,6 +85,7 @@ def test_file_by_path_reads_as_the_shipped_one(tmp_path: Path, paper: Vehicle) -
         ("rotors=3", ["rotors = 3", "not a list", "4 to 16 tables"]),
         ("rotors.0=3", ["rotors.0 = 3", "not a table"]),
         ("cable=3", ["cable = 3", "a table"]),
+        ("cable.material=nylon", ["cable.material = nylon", "cable.model = 'progressive'", "'two-way'"]),
         (
             "cable.model=rope",
             ["cable.model = 'rope'", "two-way or tension-only or linear or progressive or chain"],
