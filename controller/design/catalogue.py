@@ -24,6 +24,7 @@ from controller.law.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
     WRENCH_SIZE,
+    Array,
 )
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
@@ -80,33 +81,54 @@ def default_weights(vehicle: Vehicle, emphasis: Emphasis = EVEN, loaded: bool = 
         deviations[VEHICLE_POSITION], mass = position, vehicle.airframe.mass
     inertia = np.array(vehicle.airframe.inertia)
     efforts = np.array([mass * acceleration, *(inertia * (angular, angular, turning))])
-    e = emphasis
+    on_states, on_inputs = _factors(emphasis, loaded)
+    return Weights(np.diag(deviations**-2.0 * on_states), np.diag(efforts**-2.0 * on_inputs))
+
+
+def _factors(e: Emphasis, loaded: bool = True) -> tuple[Array, Array]:
+    """Factors on the weights of the states with the integral (21,), and on those of the inputs (4,)."""
     own = e.vehicle_position if loaded else e.load_position  # the position that matters
     on_states = np.repeat(
         [own, e.load_position, e.vehicle_velocity, e.load_velocity, e.body_rates, e.attitude, e.integral], 3
     )
-    on_inputs = np.array([e.thrust, e.moments, e.moments, e.moments])
-    return Weights(np.diag(deviations**-2.0 * on_states), np.diag(efforts**-2.0 * on_inputs))
+    return on_states, np.array([e.thrust, e.moments, e.moments, e.moments])
+
+
+def emphasised(weights: Weights, emphasis: Emphasis) -> Weights:
+    """Diagonal weights, each times its factor."""
+    on_states, on_inputs = _factors(emphasis)
+    return Weights(weights.Q * on_states[: len(weights.Q)], weights.R * on_inputs)
+
+
+def emphasis_of(vehicle: Vehicle) -> Emphasis:
+    """The factors of a vehicle description's `[law]`."""
+    return Emphasis(**vehicle.law.model_dump())
 
 
 def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     """A design by name for a vehicle and loop rate: a record of shape (1,), see `law.DESIGN`.
 
-    The loop's delay is the vehicle description's `loop.delay_ticks`. Raises ValueError for an unknown name.
+    The loop's delay is the vehicle description's `loop.delay_ticks`. Raises ValueError for an unknown name,
+    and when the weights of the description's `[law]` have no solution.
     """
+    emphasis = emphasis_of(vehicle)
     if name == "default":
-        return design_for(vehicle, rate_hz, default_weights(vehicle), FEEDFORWARD)
+        return design_for(vehicle, rate_hz, default_weights(vehicle, emphasis), FEEDFORWARD)
     if name == ON_ESTIMATE:
-        return design_for(vehicle, rate_hz, estimated_weights(vehicle), FEEDFORWARD)
+        return design_for(vehicle, rate_hz, emphasised(estimated_weights(vehicle), emphasis), FEEDFORWARD)
     if name == "paper":
-        return design_for(vehicle, rate_hz, paper_weights(), INTEGRATOR)
+        return design_for(vehicle, rate_hz, emphasised(paper_weights(), emphasis), INTEGRATOR)
     if name == "paper-lqr":
-        return design_for(vehicle, rate_hz, paper_lqr_weights(), STATE)
+        return design_for(vehicle, rate_hz, emphasised(paper_lqr_weights(), emphasis), STATE)
     raise ValueError(f"no design {name!r}; expected one of {', '.join(DESIGNS)}")
 
 
 def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) -> tuple[Design, Design]:
-    """What flies under ground control: the default design, and its like for the vehicle on a slack cable."""
+    """What flies under ground control: the default design, and its like for the vehicle on a slack cable.
+
+    emphasis: on top of the description's `[law]`.
+    """
+    emphasis = Emphasis(*(a * b for a, b in zip(emphasis, emphasis_of(vehicle), strict=True)))
     loaded, alone = (
         design_for(vehicle, rate_hz, default_weights(vehicle, emphasis, with_load), FEEDFORWARD, with_load)
         for with_load in (True, False)

@@ -16,6 +16,7 @@ from sitl_bridge.ids import ACTUATOR_CONTROLS
 from sitl_bridge.vehicle.cable_law import cable_law
 from sitl_bridge.vehicle.cable_materials import MaterialName
 from sitl_bridge.vehicle.chain import MOST_SEGMENTS
+from sitl_bridge.vehicle.law_weights import LawWeights
 from sitl_bridge.vehicle.physics import PhysicsError, physics_faults
 from sitl_bridge.vehicle.rotors import Rotor, rotor_effect
 from sitl_bridge.vehicle.schema import (
@@ -265,6 +266,7 @@ class Vehicle(Section):
     sensors: Sensors = Sensors()
     loop: Loop = Loop()
     estimation: Estimation = Estimation()
+    law: LawWeights = LawWeights()
     home: Home = Home()
 
     @model_validator(mode="after")
