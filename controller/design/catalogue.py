@@ -123,6 +123,12 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     raise ValueError(f"no design {name!r}; expected one of {', '.join(DESIGNS)}")
 
 
+def on_cable(vehicle: Vehicle, rest_length: float) -> Vehicle:
+    """The vehicle, its cable reeled to another rest length, m."""
+    cable = vehicle.cable.model_copy(update={"rest_length": rest_length})
+    return vehicle.model_copy(update={"cable": cable})
+
+
 def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) -> tuple[Design, Design]:
     """What flies under ground control: the default design, and its like for the vehicle on a slack cable.
 

@@ -39,15 +39,15 @@ class DesignProcess:
         self._questions, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
         os.set_blocking(self._answers, False)
         self._received = b""
-        self._asked: Emphasis | None = None
+        self._asked: tuple[Emphasis, float] | None = None
         """What the process is at work on"""
-        self._wanted: Emphasis | None = None
+        self._wanted: tuple[Emphasis, float] | None = None
         """What is wanted now, if that is something else"""
         self._ask({"vehicle": vehicle.model_dump_json(), "rate_hz": rate_hz})
 
-    def request(self, emphasis: Emphasis) -> None:
-        """Begin to design; what was wanted before is not any more."""
-        self._wanted = emphasis
+    def request(self, emphasis: Emphasis, rest_length: float) -> None:
+        """Begin to design, for a cable of this length (m); what was wanted before is not any more."""
+        self._wanted = (emphasis, rest_length)
         if self._asked is None:
             self._begin()
 
@@ -73,7 +73,8 @@ class DesignProcess:
 
     def _begin(self) -> None:
         self._asked, self._wanted = self._wanted, None
-        self._ask({"emphasis": self._asked})
+        assert self._asked is not None
+        self._ask({"emphasis": self._asked[0], "rest_length": self._asked[1]})
 
     def _ask(self, what: object) -> None:
         with contextlib.suppress(BrokenPipeError):  # `result` says so

@@ -13,12 +13,13 @@ def main() -> None:
     about = json.loads(sys.stdin.readline())
     for line in sys.stdin:
         # Not before the first question: a flight whose weights stay pays nothing for this process.
-        from controller.design.catalogue import Emphasis, guided_designs
+        from controller.design.catalogue import Emphasis, guided_designs, on_cable
         from sitl_bridge.vehicle.description import Vehicle
 
-        vehicle = Vehicle.model_validate_json(about["vehicle"])
+        asked = json.loads(line)
+        vehicle = on_cable(Vehicle.model_validate_json(about["vehicle"]), asked["rest_length"])
         try:
-            loaded, alone = guided_designs(vehicle, about["rate_hz"], Emphasis(*json.loads(line)["emphasis"]))
+            loaded, alone = guided_designs(vehicle, about["rate_hz"], Emphasis(*asked["emphasis"]))
             answer = b"\x01" + loaded.tobytes() + alone.tobytes()
         except (ValueError, ArithmeticError):  # LinAlgError is a ValueError: no solution for these weights
             answer = b"\x00"

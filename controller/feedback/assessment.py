@@ -44,6 +44,9 @@ class Assessor(Protocol):
     def load_released(self) -> None:
         """The gripper has let the load go."""
 
+    def reeled(self, rest_length: float) -> None:
+        """The winch has made the cable so long, m."""
+
     def assess(self, view: VehicleView) -> list[str]:
         """Write the health of sensors and estimate into the view; what there is to say."""
 
@@ -55,10 +58,10 @@ class ExactAssessor:
 
     def __init__(self, vehicle: Vehicle) -> None:
         cable = vehicle.cable
-        self._rest_length = cable.rest_length
         # A cable that is stretched by all that the rotors can pull is as long as one can be.
         pull = full_thrust(vehicle.rotors)
-        self._lost_length = LOST_LOAD * (cable.rest_length + pull / cable.stiffness)
+        self._most_stretch = pull / cable.stiffness
+        self.reeled(cable.rest_length)
         ground = vehicle.ground
         self._vehicle_rest = self._load_rest = -math.inf
         if ground is not None:
@@ -82,6 +85,11 @@ class ExactAssessor:
 
     def load_released(self) -> None:
         """Truth does not need to know."""
+
+    def reeled(self, rest_length: float) -> None:
+        """Taut and lost are judged by the cable's length of now."""
+        self._rest_length = rest_length
+        self._lost_length = LOST_LOAD * (rest_length + self._most_stretch)
 
     def assess(self, view: VehicleView) -> list[str]:
         """Nothing to say."""

@@ -36,6 +36,9 @@ class EstimateAssessor:
             in_flight=aligned and estimator.in_flight,
         )
 
+    def reeled(self, rest_length: float) -> None:
+        """The filter does not follow: the winch stands on estimates."""
+
     def load_released(self) -> None:
         """The filter's cable pulls no more."""
         self._feedback.estimator.load_released()

@@ -45,7 +45,7 @@ from controller.law.state import (
 )
 from controller.pilot.gps_display import Receiver
 from sitl_bridge.frames import CENTIAMPERES_PER_AMPERE, PERCENT, Triple, quaternion_from_euler
-from sitl_bridge.ids import GRIPPER_CONTROL
+from sitl_bridge.ids import CLUTCH_CONTROL, GRIPPER_CONTROL, WINCH_CONTROL
 from sitl_bridge.mavlink.fields import pack_voltage
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.mavlink.hil import HIL_GPS
@@ -60,6 +60,8 @@ REACH = 0.3
 """m, beyond a hanging load's distance, to which the vehicle pulls to lift the load off."""
 PICK_UP_SPEED = 0.4
 """m/s, largest, at which it does."""
+REDESIGN_SHARE = 0.1
+"""Of the cable's length, by which a winch changes it until gains are designed for it"""
 THRUST_SHARE = 0.85
 """Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
 LEAST_ACCELERATION = 0.5
@@ -82,8 +84,8 @@ WEIGHTS = {
 class Redesigner(Protocol):
     """Makes designs in the background."""
 
-    def request(self, emphasis: Emphasis) -> None:
-        """Begin to design; what was under way is given up."""
+    def request(self, emphasis: Emphasis, rest_length: float) -> None:
+        """Begin to design, for a cable of this length (m); what was under way is given up."""
 
     def result(self) -> tuple[Design, Design] | str | None:
         """The designs of the last request, once, when they are there; or why there are none."""
@@ -111,6 +113,14 @@ class GuidedAutopilot:
         self._controls = controls
         self._allocation = allocation(vehicle)
         self._gripper_control = len(vehicle.rotors) + GRIPPER_CONTROL
+        self._winch_control = len(vehicle.rotors) + WINCH_CONTROL
+        self._clutch_control = len(vehicle.rotors) + CLUTCH_CONTROL
+        self._designed_length = self._wanted_length = vehicle.cable.rest_length
+        """m, of the cable that the gains are for, or will be"""
+        self._designing = self._new_weights = False
+        winch = station.machine.winch
+        if winch is not None:
+            winch.followed = self._assessor.sees_free_load
         gripper = station.machine.gripper
         if gripper is not None:
             gripper.sees_free_load = self._assessor.sees_free_load
@@ -160,10 +170,17 @@ class GuidedAutopilot:
         self._view = None
         if self.station.machine.gripper is not None:
             self.station.machine.gripper.restart()
+        if self.station.machine.winch is not None:
+            self.station.machine.winch.restart()
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.hear_plant(frame, now)
+        winch = self.station.machine.winch
+        if frame.message_id == common.MAVLINK_MSG_ID_WINCH_STATUS and winch is not None:
+            status = decoded(frame)
+            if status is not None and math.isfinite(status.line_length + status.speed):
+                winch.heard(status.line_length, status.speed)
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
             battery = decoded(frame)
             if battery is None:
@@ -188,9 +205,14 @@ class GuidedAutopilot:
             self.station.machine.resume(view, now)
         target = self.station.update(view, now)
         self._take_designs()
+        self._follow_winch()
         self._fly(target, estimate, view, contact)
-        if self.station.machine.gripper is not None:
-            self._controls[self._gripper_control] = self.station.machine.gripper.output
+        machine = self.station.machine
+        if machine.gripper is not None:
+            self._controls[self._gripper_control] = machine.gripper.output
+        if machine.winch is not None:
+            self._controls[self._winch_control] = machine.winch.output
+            self._controls[self._clutch_control] = machine.winch.clutch
 
     def _seen(self, estimate: Array, time_usec: int, now: float) -> tuple[VehicleView, Contact, bool]:
         """The view of an estimate, what touches what in it, and whether it is the first."""
@@ -222,10 +244,38 @@ class GuidedAutopilot:
         view.throttle = float(self._controls[: len(self._vehicle.rotors)].mean()) if self.armed else 0.0
         return view, contact, first
 
+    def _follow_winch(self) -> None:
+        """Law and clearances follow the cable's rest length; gains are designed anew from a tenth on.
+
+        Seen from a load that sinks at the winch's rate the vehicle sinks with it, as on a cable of constant
+        length.
+        """
+        winch = self.station.machine.winch
+        if winch is None or not winch.followed:
+            return
+        change = winch.length - self.station.profile.rest_length
+        if change != 0.0:
+            self.station.machine.reeled(change)
+            self._assessor.reeled(winch.length)
+            self._designs[Body.LOAD]["body"]["rest_length"] = winch.length
+        hangs = self._law is Body.LOAD
+        self._trajectory.lower(change if hangs else 0.0, winch.speed if hangs else 0.0)
+        if hangs:
+            self._estimate[VEHICLE_VELOCITY.stop - 1] -= winch.speed
+        if not self._designing and abs(winch.length / self._designed_length - 1.0) > REDESIGN_SHARE:
+            self._request_designs(winch.length)
+        winch.advance(self._period)
+
+    def _request_designs(self, rest_length: float) -> None:
+        p = self.station.parameters
+        self._designing, self._wanted_length = True, rest_length
+        emphasis = EVEN._replace(**{field: p[name] for name, field in WEIGHTS.items()})
+        self._redesigner.request(emphasis, rest_length)
+
     def _work_gripper(self, view: VehicleView, now: float) -> None:
         """Fly without the load once the gripper has let it go, and with it once it has taken it."""
         gripper = self.station.machine.gripper
-        if gripper is None or not gripper.update(view, self.armed, self._vehicle.cable.rest_length):
+        if gripper is None or not gripper.update(view, self.armed, self.station.profile.rest_length):
             return
         view.load_attached = not gripper.released
         if gripper.released:
@@ -282,7 +332,7 @@ class GuidedAutopilot:
         """The vehicle alone rises above a load that lies, until it hangs."""
         if self._pulling is None or self._pulling[0] is not target:
             x, y, z = view.load_position
-            above: Triple = (x, y, z + self._vehicle.hover_length + REACH)
+            above: Triple = (x, y, z + self.station.profile.hover_length + REACH)
             yaw = float(self._trajectory.path["yaw"][0]) if math.isnan(target.yaw) else target.yaw
             goto = Goto(Body.VEHICLE, above, yaw, PICK_UP_SPEED)
             self._pulling = (target, goto)
@@ -331,18 +381,23 @@ class GuidedAutopilot:
         """New weights are designed for in the background; what is ready is taken between two ticks."""
         changed = self.station.parameters.take_changed()
         if changed & WEIGHTS.keys():
-            p = self.station.parameters
-            self._redesigner.request(EVEN._replace(**{field: p[name] for name, field in WEIGHTS.items()}))
+            self._new_weights = True
+            self._request_designs(self.station.profile.rest_length)
         result = self._redesigner.result()
         if result is None:
             return
+        self._designing = False
         if isinstance(result, str):
             self.station.announce(Notice(WARNING, f"Weights not used: {result}"), self._heard)
             return
         before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
+        self._designed_length = self._wanted_length
+        self._designs[Body.LOAD]["body"]["rest_length"] = self.station.profile.rest_length
         if self._law is not None:
             yaw = float(self._trajectory.path["yaw"][0])
             after = self._designs[self._law]
             handover.other_gains(before[self._law], after, self._memory, self._work, yaw)
             self._step = self._bound(self._law)
-        self.station.announce(Notice(INFO, "New weights fly"), self._heard)
+        if self._new_weights:
+            self._new_weights = False
+            self.station.announce(Notice(INFO, "New weights fly"), self._heard)

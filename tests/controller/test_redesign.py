@@ -15,6 +15,7 @@ from controller.law.control_law import Design
 from sitl_bridge.vehicle.files import load_vehicle
 
 IRIS = load_vehicle("iris", [])
+LENGTH = IRIS.cable.rest_length
 HEAVY = EVEN._replace(load_position=4.0)
 
 
@@ -43,33 +44,33 @@ def assert_designs(found: tuple[Design, Design] | str, emphasis: Emphasis) -> No
 
 def test_the_background_designs_the_same(process: DesignProcess) -> None:
     assert process.result() is None
-    process.request(HEAVY)
+    process.request(HEAVY, LENGTH)
     assert_designs(answer(process), HEAVY)
     assert process.result() is None
-    process.request(EVEN)
+    process.request(EVEN, LENGTH)
     assert_designs(answer(process), EVEN)
 
 
 def test_only_the_last_of_many_requests_is_answered(process: DesignProcess) -> None:
     """A client that turns a knob asks a hundred times a second: none of that waits in a pipe."""
     for step in range(5000):
-        process.request(EVEN._replace(attitude=1.0 + step))
-    process.request(HEAVY)
+        process.request(EVEN._replace(attitude=1.0 + step), LENGTH)
+    process.request(HEAVY, LENGTH)
     assert_designs(answer(process), HEAVY)
     assert process.result() is None
 
 
 def test_in_flight_no_process_is_started(process: DesignProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(subprocess, "Popen", lambda *_: pytest.fail("started a process in flight"))
-    process.request(HEAVY)
+    process.request(HEAVY, LENGTH)
     assert_designs(answer(process), HEAVY)
 
 
 def test_weights_without_a_design_and_a_process_that_is_gone_are_said(process: DesignProcess) -> None:
-    process.request(EVEN._replace(thrust=float("nan")))
+    process.request(EVEN._replace(thrust=float("nan")), LENGTH)
     assert "nearer to 1" in str(answer(process))
     process._process.kill()
     process._process.wait()
-    process.request(HEAVY)
+    process.request(HEAVY, LENGTH)
     assert "start the controller again" in str(answer(process))
-    process.request(EVEN)  # and again, without an exception
+    process.request(EVEN, LENGTH)  # and again, without an exception

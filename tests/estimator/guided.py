@@ -32,7 +32,7 @@ COLUMNS = ("time", "truth", "estimate")
 class NoRedesign:
     """Weights stay as they are."""
 
-    def request(self, emphasis: Any) -> None:
+    def request(self, emphasis: Any, rest_length: float) -> None:
         """Not asked for."""
 
     def result(self) -> None:

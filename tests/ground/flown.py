@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.design.catalogue import Emphasis, guided_designs
+from controller.design.catalogue import Emphasis, guided_designs, on_cable
 from controller.ground.flight.guidance import Stage
 from controller.ground.link.peers import Address
 from controller.ground.station import Station
@@ -39,9 +39,9 @@ class Designer:
         self._ready: tuple[Design, Design] | None = None
         self._left = 0
 
-    def request(self, emphasis: Emphasis) -> None:
+    def request(self, emphasis: Emphasis, rest_length: float) -> None:
         """Begin to design."""
-        self._ready = guided_designs(self._vehicle, RATE_HZ, emphasis)
+        self._ready = guided_designs(on_cable(self._vehicle, rest_length), RATE_HZ, emphasis)
         self._left = self._delay
 
     def result(self) -> tuple[Design, Design] | str | None:

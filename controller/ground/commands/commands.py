@@ -282,6 +282,27 @@ def _gripper(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
     return OK if c.p2 == HOLD and machine.gripper is not None else machine.grip(int(c.p2))
 
 
+def _winch(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    winch = machine.winch
+    if winch is None:
+        return Verdict(UNSUPPORTED, "Winch denied: this vehicle has none; see [winch] in its file")
+    if not winch.followed:
+        return deny("Winch denied: the estimate does not follow the cable's length; fly on truth")
+    if c.p2 == mavlink.WINCH_RELAXED:
+        winch.relax()
+    elif c.p2 == mavlink.WINCH_RELATIVE_LENGTH_CONTROL and math.isfinite(c.p3):
+        winch.go_by(c.p3, c.p4 if math.isfinite(c.p4) else 0.0)
+    elif c.p2 == mavlink.WINCH_RATE_CONTROL and math.isfinite(c.p4):
+        winch.turn(c.p4)
+    elif c.p2 in (mavlink.WINCH_LOCK, mavlink.WINCH_HOLD):
+        winch.turn(0.0)
+    elif c.p2 == mavlink.WINCH_RETRACT:
+        winch.go_by(-math.inf, 0.0)
+    else:
+        return deny(f"Winch denied: action {c.p2:g}; use 0 (relax), 1 (length), 2 (rate), 3, 5 or 6")
+    return OK
+
+
 def _pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p1 == 0.0:
         return machine.set_mode(Mode.HOLD, now)
@@ -415,6 +436,7 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_DO_ORBIT: _orbit,
     mavlink.MAV_CMD_DO_FIGURE_EIGHT: _figure_eight,
     mavlink.MAV_CMD_DO_GRIPPER: _gripper,
+    mavlink.MAV_CMD_DO_WINCH: _winch,
     mavlink.MAV_CMD_DO_PAUSE_CONTINUE: _pause,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_MISSION_START: _mission_start,

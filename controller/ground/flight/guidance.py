@@ -327,6 +327,12 @@ class Guidance:
             return setpoint
         return self._follow(setpoint, view)
 
+    def lengthened(self, change: float) -> None:
+        """The cable is longer by so much, m: the vehicle stays where it holds, and the load goes down."""
+        if self._point_of is Body.LOAD:
+            x, y, z = self._point
+            self._point = (x, y, z - change)
+
     def _hold(self, view: VehicleView) -> Goto:
         speed = limited_speed(self.speed, self._parameters)
         return Goto(self._point_of, self._point, self._yaw, speed)

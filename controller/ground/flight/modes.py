@@ -58,6 +58,7 @@ from controller.ground.flight.preconditions import arming_faults, has_settled
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
 from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
+from controller.ground.flight.winch import Winch
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import WAYPOINT
 from controller.ground.missions.mission_plan import Fault, Item
@@ -98,6 +99,8 @@ class Machine:
         self.offboard = Offboard()
         self.sticks = Sticks()
         self.gripper = None if profile.gripper is None else Gripper(profile.gripper)
+        """None: there is none."""
+        self.winch = None if profile.winch is None else Winch(profile.winch, profile.rest_length)
         """None: there is none."""
         self.mission = MissionFlight(self.gripper)
         self.failsafes = Failsafes()
@@ -311,6 +314,12 @@ class Machine:
             return deny("Gripper denied: nothing shows where the released load is; fly on truth to take it")
         self.gripper.act(action)
         return OK
+
+    def reeled(self, change: float) -> None:
+        """The winch has made the cable longer by so much, m: what was said of the load is still meant."""
+        self.profile.rest_length += change
+        self.profile.hover_length += change
+        self._guidance.lengthened(change)
 
     @property
     def pattern(self) -> Pattern | None:

@@ -125,6 +125,8 @@ class Trajectory:
         self._age = 0.0
         """s since the target was given"""
         self._target: Goto | Land | Follow | None = None
+        self._sinking = 0.0
+        """m/s, of `lower`"""
 
     def start(self, position: Array, velocity: Array, yaw: float) -> None:
         """Begin where a body is, with the velocity it has (m, m/s, rad)."""
@@ -136,6 +138,12 @@ class Trajectory:
         self._motion[:] = self._gap
         self.path["yaw"], self.path["yaw_rate"] = yaw, 0.0
         self._target = None
+
+    def lower(self, way: float, speed: float) -> None:
+        """All that was said so far is meant so much lower, m; and it sinks at a speed now, m/s."""
+        self._gap[0, 2] -= way
+        self._carrot[0, 2] -= way
+        self._sinking = speed
 
     def advance(self, target: Goto | Land | Follow, limits: Limits, time: float) -> None:
         """Go on by one period towards a target; `time` (s) is that of the law's step to come."""
@@ -152,6 +160,7 @@ class Trajectory:
         self._base = self._coast @ self._base
         self._motion[:] = gap
         self._motion[:_BASE] += self._base
+        self._motion[1, 2] -= self._sinking
         self._turn(target)
         self.path["epoch"] = time
         self._age += self._period

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from sitl_bridge.frames import Geodetic, LocalOrigin, Quaternion, Triple
 from sitl_bridge.ids import load_system, vehicle_system
-from sitl_bridge.vehicle.description import Gripper, Vehicle
+from sitl_bridge.vehicle.description import Gripper, Vehicle, Winch
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Profile:
-    """The facts about one vehicle that its services need."""
+    """The facts about one vehicle that its services need. A winch changes the cable's lengths in flight."""
 
     name: str
     instance: int
@@ -32,6 +32,8 @@ class Profile:
     hover_thrust: float = 0.5
     """That carries vehicle and load, as a share of what the rotors can give"""
     gripper: Gripper | None = None
+    """None: there is none."""
+    winch: Winch | None = None
     """None: there is none."""
 
     @property
@@ -60,6 +62,7 @@ def profile_of(vehicle: Vehicle, instance: int = 0, has_ground: bool = True) -> 
         None if vehicle.battery is None else vehicle.battery.cells,
         vehicle.hover_thrust / sum(r.thrust_coefficient * r.max_speed**2 for r in vehicle.rotors),
         vehicle.gripper,
+        vehicle.winch,
     )
 
 

@@ -1,0 +1,89 @@
+"""The winch as ground control sees it: what it was told, and the rest length that it reports."""
+
+from __future__ import annotations
+
+from sitl_bridge.vehicle.description import Winch as Description
+
+_STIFFNESS = 1.0
+"""1/s, with which the last bit of way to a length decays"""
+_ACCELERATION = 0.4
+"""m/s², with which the rate grows: what the load gains the vehicle loses, until the rotors have followed"""
+_THERE = 0.01
+"""m, near enough to a length"""
+
+
+class Winch:
+    """One winch; a length is held by feedback of what it reports."""
+
+    def __init__(self, description: Description, rest_length: float) -> None:
+        """rest_length: m, as described."""
+        self.description = description
+        self.followed = True
+        """Whether the feedback that is flown on follows the rest length"""
+        self._first = rest_length
+        self.restart()
+
+    def restart(self) -> None:
+        """As described, and locked."""
+        self.length, self.speed = self._first, 0.0
+        """m and m/s, of the rest length: as reported, and as moved on since"""
+        self.free = False
+        """The clutch is open"""
+        self.target: float | None = None
+        """m, of a length that was asked for"""
+        self._rate = 0.0
+        self._most = self.description.rate
+        self._commanded = 0.0
+        """m/s, now"""
+
+    def heard(self, length: float, speed: float) -> None:
+        """A report of the winch, m and m/s."""
+        self.length, self.speed = length, speed
+
+    def advance(self, seconds: float) -> None:
+        """Time goes by since the last report, and the command follows what is wanted."""
+        self.length += self.speed * seconds
+        wanted, before = self._wanted_rate(), self._commanded
+        step = _ACCELERATION * seconds
+        low = before - step if before <= 0.0 else 0.0
+        high = before + step if before >= 0.0 else 0.0
+        self._commanded = min(max(wanted, low), high)
+
+    def relax(self) -> None:
+        """Open the clutch: the cable runs out by its tension."""
+        self.target, self._rate, self.free = None, 0.0, True
+
+    def go_by(self, length: float, rate: float) -> None:
+        """Pay out (positive) or reel in so much, m, at a rate, m/s (0: the winch's own)."""
+        d = self.description
+        low, high = min(d.min_length, self._first), max(d.max_length, self._first)
+        self.target = min(max(self.length + length, low), high)
+        self._most = min(abs(rate) or d.rate, d.rate)
+        self.free = False
+
+    def turn(self, rate: float) -> None:
+        """Pay out (positive) or reel in at a rate, m/s; 0: stand."""
+        most = self.description.rate
+        self.target, self._rate, self.free = None, min(max(rate, -most), most), False
+
+    @property
+    def done(self) -> bool:
+        """Whether the length that was asked for is there."""
+        return self.target is None or abs(self.target - self.length) < _THERE
+
+    @property
+    def output(self) -> float:
+        """Actuator control: -1 reel in, 1 pay out, at the winch's rate."""
+        return self._commanded / self.description.rate
+
+    def _wanted_rate(self) -> float:
+        """m/s"""
+        if self.target is None:
+            return self._rate
+        rate = 0.0 if self.done else _STIFFNESS * (self.target - self.length)
+        return min(max(rate, -self._most), self._most)
+
+    @property
+    def clutch(self) -> float:
+        """Actuator control: -1 open, 1 closed."""
+        return -1.0 if self.free else 1.0

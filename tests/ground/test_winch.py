@@ -1,0 +1,75 @@
+"""DO_WINCH, flown on the real plant: the vehicle hovers, the load goes up and down below it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.ground.rig import NAN, Rig
+from tests.ground.test_gripper import ACCEPTED, DENIED, UNSUPPORTED, hovering
+
+DO_WINCH = 42600
+RELAX, LENGTH, RATE, LOCK, DELIVER, HOLD, RETRACT = 0, 1, 2, 3, 4, 5, 6
+
+
+@pytest.mark.parametrize(("vehicle", "height"), [("iris", 9.0), ("heavy", 36.0)])
+def test_the_whole_range_is_reeled_below_a_hovering_vehicle(vehicle: str, height: float) -> None:
+    flight, client = hovering(vehicle, height)
+    winch = flight.vehicle.winch
+    assert winch is not None
+    before = flight.flown(0.1).vehicle[-1].copy()
+    for length in (winch.max_length, winch.min_length):
+        start = flight.simulation.world.reel().length
+        assert client.command(DO_WINCH, 1, LENGTH, length - start, winch.rate).result == ACCEPTED
+        duration = abs(length - start) / winch.rate + 8.0
+        flight.run(duration)
+        way = flight.flown(duration)
+        assert flight.simulation.world.reel().length == pytest.approx(length, abs=0.03)
+        assert np.abs(way.vehicle - before).max() < 0.5
+        hanging = way.vehicle[-1, 2] - way.load[-1, 2]
+        assert not [text for text in client.texts() if "lost" in text]
+        stretch = flight.vehicle.hover_length - flight.vehicle.cable.rest_length
+        assert hanging == pytest.approx(length + stretch, abs=0.05)
+
+
+def test_rate_hold_lock_and_retract() -> None:
+    flight, client = hovering("iris", 9.0)
+    assert client.command(DO_WINCH, 1, RATE, 0, 0.3).result == ACCEPTED
+    flight.run(3.0)
+    assert flight.simulation.world.reel().rate == pytest.approx(0.3, abs=1e-3)
+    assert client.command(DO_WINCH, 1, HOLD).result == ACCEPTED
+    flight.run(2.0)
+    assert flight.simulation.world.reel().rate == 0.0
+    assert client.command(DO_WINCH, 1, RATE, 0, -0.3).result == ACCEPTED
+    flight.run(1.0)
+    assert client.command(DO_WINCH, 1, LOCK).result == ACCEPTED
+    flight.run(2.0)
+    assert flight.simulation.world.reel().rate == 0.0
+    assert client.command(DO_WINCH, 1, RETRACT).result == ACCEPTED
+    flight.run(8.0)
+    assert flight.vehicle.winch is not None
+    assert flight.simulation.world.reel().length == pytest.approx(flight.vehicle.winch.min_length, abs=0.03)
+
+
+def test_relaxed_the_load_runs_out_until_it_lies() -> None:
+    flight, client = hovering("iris", 5.0)
+    before = flight.flown(0.1).vehicle[-1].copy()
+    assert client.command(DO_WINCH, 1, RELAX).result == ACCEPTED
+    flight.run(40.0)
+    way = flight.flown(40.0)
+    assert way.load[-1, 2] < 0.1
+    assert np.abs(way.vehicle - before).max() < 0.5
+
+
+def test_what_is_no_action_is_denied() -> None:
+    flight, client = hovering()
+    for action in (-1, 0.5, 10, NAN):
+        assert client.command(DO_WINCH, 1, action, 0, 0).result == DENIED
+    assert client.command(DO_WINCH, 1, LENGTH, NAN, 0).result == DENIED
+    assert client.command(DO_WINCH, 1, RATE, 0, NAN).result == DENIED
+    flight.run(1.0)
+    assert flight.simulation.world.reel().rate == 0.0
+
+
+def test_a_vehicle_without_a_winch_says_so() -> None:
+    assert Rig().client().command(DO_WINCH, 1, RELAX).result == UNSUPPORTED
