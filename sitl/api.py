@@ -29,6 +29,7 @@ from sitl.flights.scenario import (
     plant_vehicle,
     scenario_vehicle,
     usual_feedback,
+    with_agility,
 )
 from sitl.json_values import plain
 from sitl_bridge.plant.faults.schedule import checked
@@ -82,6 +83,7 @@ def fly(
     seed: int = 0,
     design: str = "default",
     law: str | Callable[..., OwnLaw] | None = None,
+    agility: float | None = None,
     feedback: str | None = None,
     rate_hz: float = 250.0,
     duration_s: float | None = None,
@@ -92,13 +94,16 @@ def fly(
     scenario: a shipped name, a .toml file, or a `Scenario`. vehicle: a shipped name, a .toml file, or a
     complete `Vehicle`; by default the scenario's. overrides: `KEY=VALUE` as for `--set`. plant_overrides: the
     same, but the controller is not told. law: a class of one's own instead of the design, see
-    `controller.own_law.interface`, or its name as for `--law`. feedback: `truth` or `estimate`, by default as
-    for `sitl fly`. out: a folder for all that `sitl fly` leaves; by default nothing is written.
+    `controller.own_law.interface`, or its name as for `--law`. agility: how fast the load goes to its
+    reference, 0 (gentle) to 1 (all that the vehicle can do), by default the scenario's, else 0.7. feedback:
+    `truth` or `estimate`, by default as for `sitl fly`. out: a folder for all that `sitl fly` leaves; by
+    default nothing is written.
 
     Raises DescriptionError, with a line for each fault, for what cannot be flown; LawError when the law
     fails in flight.
     """
     described = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    described = with_agility(described, _checked_agility(agility))
     if isinstance(described.reference, GroundControl):
         raise DescriptionError(
             str(scenario), ["ground control takes processes of its own; expected a reference"]
@@ -150,6 +155,12 @@ def fly(
         summary, states, estimates = _written(facts, path, folder, told, feedback)
     reference = reference_positions(path, states["time_s"])
     return Flight(summary, states, estimates, reference, tuple(ended.said), folder)
+
+
+def _checked_agility(agility: float | None) -> float | None:
+    if agility is not None and not 0.0 <= agility <= 1.0:
+        raise DescriptionError("agility", [f"{agility!r}; expected 0 (gentle) to 1 (all there is)"])
+    return agility
 
 
 def _vehicles(

@@ -172,7 +172,7 @@ def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int, l
     record["past_gain"][0, :delay] = gain.past
     time_constant = rotor_time_constant(vehicle)
     # A command acts, on average over its period, half a period after the delay; lagging rotors later still.
-    record["lead_time"] = (delay + 0.5) * period + time_constant
+    record["lead_time"], record["rotor_lag"] = (delay + 0.5) * period, time_constant
     if time_constant > 0.0:
         record["lag_gain"] = gain.state[:, lag]
         record["lag_decay"] = math.exp(-period / time_constant)

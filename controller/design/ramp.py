@@ -1,8 +1,9 @@
-"""How fast a reference may leave its start: within what the vehicle that follows it can do.
+"""How a reference leaves its start: as fast as the vehicle that follows it can, within limits.
 
 The load's position is a flat output (`law.flatness`): the vehicle's way, tilt and thrust follow from it. On a
 long cable the vehicle's acceleration is the load's plus l/g times its snap, so a short step may ask for more
-than a long one. The ramp is the shortest one whose motion stays within the limits.
+than a long one. To a set-point the load goes on a straight line in the shortest time (`design.fastest`); onto
+a circle it goes with the shortest smooth step whose motion stays within the limits.
 """
 
 from __future__ import annotations
@@ -11,28 +12,34 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import PPoly
 
-from controller.law.reference import SMOOTH_STEP, Path
+from controller.design.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
+from controller.design.fastest import fastest
+from controller.design.limits import Limits, limits_of
+from controller.design.straight_line import StraightLine, drag_force
+from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised
-from sitl_bridge.vehicle.description import Drag, Vehicle
-from sitl_bridge.vehicle.rotors import full_thrust, rotor_effect
+from sitl_bridge.vehicle.description import Vehicle
+from sitl_bridge.vehicle.rotors import rotor_effect
 
-LARGEST_TILT = math.radians(25.0)
-"""Of the vehicle along the ramp, rad."""
 OVER_THE_PATH = 1.3
 """So much more tilt than a moving path asks for itself is allowed while the load goes over to it."""
 STEEPEST = math.radians(35.0)
 """Likewise, but no more than this, if the path does not ask for more itself."""
 LARGEST_THRUST = 0.85
-"""Of each rotor's at full speed: the rest is left to the feedback."""
-LEAST_TENSION = 0.3
-"""Of the load's weight: the cable stays taut."""
+"""Of each rotor's at full speed, on a circle: the rest is left to the feedback."""
+ENTRY_SHARE = 25.0 / 39.3
+"""Of the limit of tilt, that is used on the way onto a circle if the circle itself asks for no more."""
 SHORTEST_RAMP = 1.0
-"""s, beside ten time constants of the rotors."""
+"""s, of a smooth step, beside ten time constants of the rotors."""
 RELAXATIONS = 8.0
-"""Shortest ramp over the cable's relaxation time, damping over stiffness. The feed-forward has the damper's
-share of the stretch to first order in that time: `paper` with 51 N s/m leaned by 73 degrees in one of 4."""
+"""Shortest smooth step over the cable's relaxation time, damping over stiffness. The feed-forward has the
+damper's share of its stretch to first order in that time: with 51 N s/m `paper` leaned by 73 degrees in one
+of 4."""
+SHORTEST_STEP = 1.2
+"""s, to a set-point, beside three time constants of the rotors."""
 LONGEST_RAMP = 600.0
 """s; nothing that hovers needs more."""
 _SAMPLES = 400
@@ -52,40 +59,67 @@ class Demand(NamedTuple):
     """N, the least."""
 
 
-def planned(path: Path, vehicle: Vehicle) -> Path:
-    """The path (1,) with its ramp time made long enough for the vehicle; a path given moment by moment stays.
+def planned(path: Path, vehicle: Vehicle, estimated: bool = False) -> Path:
+    """The path (1,) with a ramp that suits the vehicle and its agility; one given moment by moment stays.
 
-    The motion is feasible if the path itself is.
+    estimated: it is flown on the estimate. The motion is feasible if the path itself is.
     """
     out, vehicle = path.copy(), linearised(vehicle)
     if out["local"][0]:
         return out
-    lag = max(rotor.time_constant for rotor in vehicle.rotors)
+    if out["radius"][0] > 0.0:
+        return smoothly_planned(path, vehicle)
+    _plan_step(out, vehicle, limits_of(vehicle, float(path["agility"][0]), estimated))
+    return out
+
+
+def smoothly_planned(path: Path, vehicle: Vehicle) -> Path:
+    """The path (1,) with the shortest smooth step that suits the vehicle and its agility."""
+    out, vehicle = path.copy(), linearised(vehicle)
+    limits = limits_of(vehicle, float(path["agility"][0]))
     relaxation = vehicle.cable.damping / vehicle.cable.stiffness
-    low, high = max(SHORTEST_RAMP + 10.0 * lag, RELAXATIONS * relaxation), LONGEST_RAMP
-    if _within(out, vehicle, low):
+    low = max(SHORTEST_RAMP + 10.0 * _slowest_rotor(vehicle), RELAXATIONS * relaxation)
+    high = LONGEST_RAMP
+    if _within(out, vehicle, low, limits):
         high = low
     while high > low * (1.0 + _TOLERANCE):
         middle = math.sqrt(low * high)
-        low, high = (low, middle) if _within(out, vehicle, middle) else (middle, high)
+        low, high = (low, middle) if _within(out, vehicle, middle, limits) else (middle, high)
     out["ramp_time"] = high
     return out
+
+
+def _plan_step(path: Path, vehicle: Vehicle, limits: Limits) -> None:
+    """The fastest motion to a set-point."""
+    way = path["centre"][0] - path["start"][0]
+    if not way.any():
+        return
+    shortest = SHORTEST_STEP + 3.0 * _slowest_rotor(vehicle)
+    motion = fastest(StraightLine(vehicle, way, limits), shortest)
+    path["ramp_time"], path["pieces"], path["profile"] = motion.duration, len(motion.pieces), motion.pieces
+    lag = cable_lag(vehicle.cable)
+    if lag > 0.0:
+        times = np.linspace(0.0, motion.duration, SAMPLES)
+        _, velocity, acceleration = _motion(path, motion.duration, times)
+        tension = np.linalg.norm(_pull(vehicle, velocity, acceleration), axis=1)
+        path["cable_lag"], path["lengths"] = lag, planned_lengths(tension, motion.duration, vehicle.cable)
 
 
 def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Demand:
     """What the path asks for over the times (n,), s, evenly spaced, if its ramp takes `ramp_time` s."""
     load, velocity, acceleration = _motion(path, ramp_time, times)
     gravity = np.array([0.0, 0.0, vehicle.gravity])
-    pull = vehicle.load.mass * (acceleration + gravity) + _drag(vehicle.load.drag, velocity)
+    pull = _pull(vehicle, velocity, acceleration)
     tension = np.linalg.norm(pull, axis=1)
-    length = vehicle.cable.rest_length + tension / vehicle.cable.stiffness
+    spacing = float(times[1] - times[0])
+    steady = vehicle.cable.rest_length + tension / vehicle.cable.stiffness
+    length = lagging(steady, spacing, float(path["cable_lag"][0]))
     position = load + (length / np.maximum(tension, 1e-9))[:, None] * pull
-    spacing = times[1] - times[0]
     own = (position[2:] - 2.0 * position[1:-1] + position[:-2]) / spacing**2
-    drag = _drag(vehicle.airframe.drag, (position[2:] - position[:-2]) / (2.0 * spacing))
+    drag = drag_force(vehicle.airframe.drag, (position[2:] - position[:-2]) / (2.0 * spacing))
     force = vehicle.airframe.mass * (own + gravity) + pull[1:-1] + drag
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), force[:, 2])
-    return Demand(float(tilt.max()), _rotor_share(vehicle, force, float(spacing)), float(pull[:, 2].min()))
+    return Demand(float(tilt.max()), _rotor_share(vehicle, force, spacing), float(pull[:, 2].min()))
 
 
 def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
@@ -111,10 +145,10 @@ def _rotor_share(vehicle: Vehicle, force: Array, spacing: float) -> float:
     return float((given / most[:, None]).max())
 
 
-def _drag(drag: Drag, velocity: Array) -> Array:
-    """Force (n, 3), N, against the drag of a body at velocities (n, 3), m/s, in still air."""
-    speed = np.linalg.norm(velocity, axis=1)
-    return np.asarray((drag.linear + drag.quadratic * speed)[:, None] * velocity)
+def _pull(vehicle: Vehicle, velocity: Array, acceleration: Array) -> Array:
+    """The cable's pull (n, 3), N, on a load that moves like this (n, 3), m/s and m/s²."""
+    weightless = vehicle.load.mass * (acceleration + np.array([0.0, 0.0, vehicle.gravity]))
+    return np.asarray(weightless + drag_force(vehicle.load.drag, velocity))
 
 
 def _second(values: Array, spacing: float) -> Array:
@@ -122,18 +156,22 @@ def _second(values: Array, spacing: float) -> Array:
     return np.asarray(np.gradient(np.gradient(values, spacing), spacing))
 
 
-def _within(path: Path, vehicle: Vehicle, ramp_time: float) -> bool:
-    """Whether the ramp asks for no more than the limits, or than the path does itself behind it."""
+def _within(path: Path, vehicle: Vehicle, ramp_time: float, limits: Limits) -> bool:
+    """Whether a smooth step onto the path asks for no more than the limits, or than the path does itself."""
     ramp = demand(path, vehicle, ramp_time, np.linspace(0.0, ramp_time, _SAMPLES))
-    tilt, tension = LARGEST_TILT, LEAST_TENSION * vehicle.load.mass * vehicle.gravity
-    hover = vehicle.hover_thrust / full_thrust(vehicle.rotors)
-    thrust = max(LARGEST_THRUST, hover + 0.25 * (1.0 - hover))
-    if path["radius"][0] > 0.0:
-        own = demand_of_circle(path, vehicle)
-        steep = max(own.tilt, min(OVER_THE_PATH * own.tilt, STEEPEST))
-        tilt, thrust = max(tilt, steep), max(thrust, own.thrust)
-        tension = min(tension, own.tension)
-    return ramp.tilt <= tilt and ramp.thrust <= thrust and ramp.tension >= tension
+    own = demand_of_circle(path, vehicle)
+    steep = max(own.tilt, min(OVER_THE_PATH * own.tilt, STEEPEST))
+    tension = min(limits.tension * vehicle.load.mass * vehicle.gravity, own.tension)
+    return (
+        ramp.tilt <= max(ENTRY_SHARE * limits.tilt, steep)
+        and ramp.thrust <= max(limits.most_thrust, own.thrust)
+        and ramp.tension >= tension
+    )
+
+
+def _slowest_rotor(vehicle: Vehicle) -> float:
+    """s, the longest time constant of a rotor."""
+    return max(rotor.time_constant for rotor in vehicle.rotors)
 
 
 def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:
@@ -148,10 +186,23 @@ def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, A
     away[0] = away[0] + path["centre"][0] - start
     if ramp_time <= 0.0:
         return start + away[0], away[1], away[2]
-    share = np.clip(times / ramp_time, 0.0, 1.0)
-    w = [derivative(share)[:, None] / ramp_time**order for order, derivative in enumerate(_SMOOTH_STEP)]
+    w = [share[:, None] / ramp_time**order for order, share in enumerate(_shares(path, times / ramp_time))]
     return (
         start + w[0] * away[0],
         w[1] * away[0] + w[0] * away[1],
         w[2] * away[0] + 2.0 * w[1] * away[1] + w[0] * away[2],
     )
+
+
+def _shares(path: Path, times: Array) -> Array:
+    """Share of the way, and its first two derivatives (3, n), at times (n,) over the ramp time."""
+    times = np.clip(times, 0.0, 1.0)
+    pieces = int(path["pieces"][0])
+    if pieces == 0:
+        return np.array([derivative(times) for derivative in _SMOOTH_STEP])
+    scaled = (
+        path["profile"][0, :pieces].T[::-1]
+        * float(pieces) ** np.arange(PIECE_ORDER - 1.0, -1.0, -1.0)[:, None]
+    )
+    profile = PPoly(scaled, np.linspace(0.0, 1.0, pieces + 1))
+    return np.array([profile(times, order) for order in range(3)])

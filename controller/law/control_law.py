@@ -39,7 +39,8 @@ DESIGN = np.dtype(
         ("integral_gain", "f8", (WRENCH_SIZE, 3)),
         ("past_gain", "f8", (LONGEST_DELAY, WRENCH_SIZE, WRENCH_SIZE)),
         ("delay", "i8"),  # ticks
-        ("lead_time", "f8"),  # s from a command to the middle of its effect
+        ("lead_time", "f8"),  # s from a command to the middle of its effect, the rotors' lag not counted
+        ("rotor_lag", "f8"),  # s
         ("lag_decay", "f8"),  # share of the rotors' lag that is left after a period
         ("anti_windup", "f8", (3, WRENCH_SIZE)),
         ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
@@ -64,12 +65,13 @@ WORK = np.dtype(
         ("reference", "f8", 3),  # p_ref, m
         ("deviation", "f8", STATE_SIZE),  # x - x*
         ("desired", "f8", STATE_SIZE),  # x*
-        ("integral", "f8", 3),  # v, m s, in the heading's frame
+        ("integral", "f8", 3),  # v, m s, in the frame
         ("feedforward", "f8", WRENCH_SIZE),  # u*
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("heading", "f8", 2),  # cosine and sine of the reference's yaw
+        ("frame", "f8", (3, 3)),  # rows: x, y, z axes, in the world, of the model that the gains are for
         ("stencil", STENCIL),
     ]
 )
@@ -90,18 +92,62 @@ def engaged_memory(load_position: Array) -> Memory:
 
 
 @kernel
-def _turn(cosine: float, sine: float, vector: Array) -> None:
-    """Turn a vector (3,) about the vertical."""
-    x, y = vector[0], vector[1]
-    vector[0], vector[1] = cosine * x - sine * y, sine * x + cosine * y
+def _set_frame(heading: Array, upward: Array, frame: Array) -> None:
+    """A frame whose z axis is `upward` (3,), its x axis above or below the heading: rows of frame (3, 3)."""
+    east, north = upward[0], upward[1]
+    x, y, z = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east, upward[2]
+    in_plane, size = math.sqrt(x * x + z * z), math.sqrt(x * x + y * y + z * z)
+    c_pitch, s_pitch, c_roll, s_roll = z / in_plane, x / in_plane, in_plane / size, -y / size
+    c_yaw, s_yaw = heading[0], heading[1]
+    frame[0, 0], frame[0, 1], frame[0, 2] = c_yaw * c_pitch, s_yaw * c_pitch, -s_pitch
+    frame[1, 0] = c_yaw * s_pitch * s_roll - s_yaw * c_roll
+    frame[1, 1] = s_yaw * s_pitch * s_roll + c_yaw * c_roll
+    frame[1, 2] = c_pitch * s_roll
+    frame[2, 0] = c_yaw * s_pitch * c_roll + s_yaw * s_roll
+    frame[2, 1] = s_yaw * s_pitch * c_roll - c_yaw * s_roll
+    frame[2, 2] = c_pitch * c_roll
+
+
+@kernel
+def _into(frame: Array, vector: Array) -> None:
+    """A vector (3,) of the world, in a frame."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        vector[i] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
+
+
+@kernel
+def _out_of(frame: Array, vector: Array) -> None:
+    """A vector (3,) of a frame, in the world."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        vector[i] = frame[0, i] * x + frame[1, i] * y + frame[2, i] * z
+
+
+@kernel
+def _thrust_error(desired: Array, estimate: Array, out: Array) -> None:
+    """Roll and pitch of the deviation out (18,): the angle (rad) from the thrust of x* (18,) to the thrust.
+
+    A rotation about body axes; at small tilt its parts are the differences of the angles.
+    """
+    roll, away = desired[15], estimate[16] - desired[16]
+    s_roll, c_roll = math.sin(estimate[15]), math.cos(estimate[15])
+    about_x = math.cos(roll) * s_roll - math.sin(roll) * math.cos(away) * c_roll
+    about_y = math.sin(away) * c_roll
+    sine = math.sqrt(about_x**2 + about_y**2)
+    cosine = math.sin(roll) * s_roll + math.cos(roll) * math.cos(away) * c_roll
+    scale = math.atan2(sine, cosine) / sine if sine > 1e-9 else 1.0
+    out[15], out[16] = scale * about_x, scale * about_y
 
 
 @kernel
 def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, work: Any) -> None:
     """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s).
 
-    The model is linear about a yaw of zero: its x axis is the heading, and horizontal deviations are turned
-    into that frame. Roll and pitch are towards the heading anyway.
+    The model is linear about hover at a yaw of zero: its x axis is the heading, its z axis the vertical.
+    Along a motion that was planned ahead its z axis is the cable's: an accelerated load hangs in its cable as
+    one at rest does, only aslant and heavier. Deviations are turned into that frame. Roll and pitch are
+    towards the heading anyway.
     """
     work.heading[0], work.heading[1] = math.cos(path.yaw), math.sin(path.yaw)
     if design.entry == FEEDFORWARD:
@@ -111,6 +157,7 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
             path,
             t,
             design.lead_time,
+            design.rotor_lag,
             work.heading,
             work.stencil,
             work.desired,
@@ -132,8 +179,15 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
         work.desired[17] = path.yaw
     for i in range(STATE_SIZE):
         work.deviation[i] = estimate[i] - work.desired[i]
+    if design.entry == FEEDFORWARD and not path.local:
+        _thrust_error(work.desired, estimate, work.deviation)
+        upward = work.stencil.pull[2] if design.body.load_mass > 0.0 else work.stencil.force[2]
+        _set_frame(work.heading, upward, work.frame)
+    else:
+        work.frame[2, 0], work.frame[2, 1], work.frame[2, 2] = 0.0, 0.0, 1.0
+        _set_frame(work.heading, work.frame[2], work.frame)
     for i in range(0, 12, 3):  # both positions, both velocities
-        _turn(work.heading[0], -work.heading[1], work.deviation[i : i + 3])
+        _into(work.frame, work.deviation[i : i + 3])
     yaw = STATE_SIZE - 1
     work.deviation[yaw] -= 2.0 * math.pi * math.floor(work.deviation[yaw] / (2.0 * math.pi) + 0.5)
 
@@ -151,7 +205,7 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
             memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
         memory.last_error[axis] = error
         work.integral[axis] = memory.integral[axis]
-    _turn(work.heading[0], -work.heading[1], work.integral)
+    _into(work.frame, work.integral)
     memory.ticks += 1
     for k in range(WRENCH_SIZE):
         u = work.feedforward[k]
@@ -183,6 +237,6 @@ def remember(design: Any, memory: Any, work: Any) -> None:
     for axis in range(3):
         for k in range(WRENCH_SIZE):
             work.integral[axis] += design.anti_windup[axis, k] * (work.achieved[k] - work.wrench[k])
-    _turn(work.heading[0], work.heading[1], work.integral)
+    _out_of(work.frame, work.integral)
     for axis in range(3):
         memory.integral[axis] = work.integral[axis]

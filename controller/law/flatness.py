@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.law.reference import DERIVATIVES, feasible
+from controller.law.reference import DERIVATIVES, feasible, piece_at, polynomial
 from controller.law.state import Array
 from sitl_bridge.compiled import kernel
 from sitl_bridge.vehicle.description import Vehicle
@@ -23,17 +23,21 @@ from sitl_bridge.vehicle.description import Vehicle
 STENCIL_STEP = 2e-3
 """Spacing of the central differences, s."""
 
+LAGS_TO_REST = 30.0
+"""Time constants of the cable after which its stretch is that of hover, to the last digits."""
+
 POINTS = 5
 STENCIL = np.dtype(
     [
         ("derivatives", "f8", (DERIVATIVES + 1, 3)),
-        ("smooth_step", "f8", DERIVATIVES + 1),
+        ("profile", "f8", DERIVATIVES + 1),
         ("load", "f8", (POINTS, 3)),  # m
         ("vehicle", "f8", (POINTS, 3)),  # m
         ("pull", "f8", (POINTS, 3)),  # N, of the cable on the load
         ("force", "f8", (POINTS, 3)),  # N, that the rotors have to give
         ("thrust", "f8", POINTS),  # N
-        ("tilt", "f8", (POINTS, 2)),  # roll and pitch, rad
+        ("later", "f8", 4),  # N and N m, thrust and moments a little later
+        ("attitude", "f8", (POINTS, 3)),  # roll, pitch, and yaw from the path's own, rad
     ]
 )
 
@@ -72,8 +76,22 @@ def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
 
 
 @kernel
-def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
-    """Where the vehicle is for the load's derivatives r (6, 3), and how the cable pulls the load.
+def _planned_length(path: Any, t: float, at_rest: float) -> float:
+    """Length of the cable, m, at time t (s) of a path that gives it; `at_rest` is that behind the ramp.
+
+    Behind the ramp the tension is constant, and the damper lets the rest of the stretch go.
+    """
+    if t < path.ramp_time:
+        share = max(0.0, t) / path.ramp_time
+        piece = piece_at(path.pieces, share)
+        return polynomial(path.lengths[piece], share * path.pieces - piece)
+    last = polynomial(path.lengths[path.pieces - 1], 1.0)
+    return at_rest + (last - at_rest) * math.exp((path.ramp_time - t) / path.cable_lag)
+
+
+@kernel
+def _hang(b: Any, path: Any, t: float, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
+    """Where the vehicle is for the load's derivatives r (6, 3) at time t (s), and how the cable pulls it.
 
     Without a load the derivatives are the vehicle's own.
     """
@@ -93,12 +111,26 @@ def _hang(b: Any, r: Array, load: Array, vehicle: Array, pull: Array) -> None:
         squared += pull[i] * pull[i]
         slope += pull[i] * (b.load_mass * r[3, i] + drag * r[2, i] + gaining * r[1, i])
     tension = math.sqrt(squared)
-    # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
-    stretch = tension / b.stiffness - b.damping * (slope / tension) / b.stiffness**2
-    length = b.rest_length + stretch
+    if path.cable_lag > 0.0:
+        length = _planned_length(path, t, b.rest_length + tension / b.stiffness)
+    else:
+        # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
+        length = b.rest_length + tension / b.stiffness - b.damping * (slope / tension) / b.stiffness**2
     for i in range(3):
         load[i] = r[0, i]
         vehicle[i] = r[0, i] + length * pull[i] / tension
+
+
+@kernel
+def _swing(x: float, y: float, z: float, attitude: Array) -> None:
+    """Roll, pitch and yaw (3,) of the shortest turn from upright to a thrust along (x, y, z), a unit vector.
+
+    It takes no moment about the vehicle's own axis, the one that rotors are worst at.
+    """
+    upright = 1.0 + z
+    attitude[0] = math.atan2(-y, z)
+    attitude[1] = math.asin(x)
+    attitude[2] = math.atan2(-x * y / upright, 1.0 - x * x / upright)
 
 
 @kernel
@@ -109,8 +141,9 @@ def _lean(b: Any, path: Any, t: float, heading: Array, stencil: Any) -> None:
     """
     h = STENCIL_STEP
     for j in range(POINTS):
-        feasible(path, t + (j - POINTS // 2) * h, stencil.derivatives, stencil.smooth_step)
-        _hang(b, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
+        at = t + (j - POINTS // 2) * h
+        feasible(path, at, stencil.derivatives, stencil.profile)
+        _hang(b, path, at, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
     for j in range(1, POINTS - 1):
         squared = 0.0
         for i in range(3):
@@ -125,20 +158,25 @@ def _lean(b: Any, path: Any, t: float, heading: Array, stencil: Any) -> None:
         east, north, z = stencil.force[j, 0], stencil.force[j, 1], stencil.force[j, 2]
         x, y = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east
         stencil.thrust[j] = math.sqrt(x * x + y * y + z * z)
-        stencil.tilt[j, 0] = -math.asin(y / stencil.thrust[j])
-        stencil.tilt[j, 1] = math.atan2(x, z)
+        if path.pieces > 0:
+            _swing(x / stencil.thrust[j], y / stencil.thrust[j], z / stencil.thrust[j], stencil.attitude[j])
+        else:
+            stencil.attitude[j, 0] = -math.asin(y / stencil.thrust[j])
+            stencil.attitude[j, 1] = math.atan2(x, z)
+            stencil.attitude[j, 2] = 0.0
 
 
 @kernel
 def _body_rates(stencil: Any, yaw_rate: float) -> tuple[float, float, float]:
     """Body rates p, q, r (rad/s) at the stencil's middle, from Euler rates (eq. 14)."""
     h = STENCIL_STEP
-    roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
-    roll_rate = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
-    pitch_rate = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
-    upright = math.cos(pitch) * yaw_rate
+    roll, pitch = stencil.attitude[2, 0], stencil.attitude[2, 1]
+    roll_rate = (stencil.attitude[3, 0] - stencil.attitude[1, 0]) / (2.0 * h)
+    pitch_rate = (stencil.attitude[3, 1] - stencil.attitude[1, 1]) / (2.0 * h)
+    turning = yaw_rate + (stencil.attitude[3, 2] - stencil.attitude[1, 2]) / (2.0 * h)
+    upright = math.cos(pitch) * turning
     return (
-        roll_rate - math.sin(pitch) * yaw_rate,
+        roll_rate - math.sin(pitch) * turning,
         math.cos(roll) * pitch_rate + math.sin(roll) * upright,
         -math.sin(roll) * pitch_rate + math.cos(roll) * upright,
     )
@@ -146,24 +184,28 @@ def _body_rates(stencil: Any, yaw_rate: float) -> tuple[float, float, float]:
 
 @kernel
 def _moments(b: Any, stencil: Any, yaw_rate: float, wrench: Array) -> None:
-    """M = I w' + w x I w at the stencil's middle: wrench[1:4], N m. The yaw rate is taken for constant."""
+    """M = I w' + w x I w at the stencil's middle: wrench[1:4], N m. The path's yaw rate is constant."""
     h = STENCIL_STEP
-    roll, pitch = stencil.tilt[2, 0], stencil.tilt[2, 1]
-    d_roll = (stencil.tilt[3, 0] - stencil.tilt[1, 0]) / (2.0 * h)
-    d_pitch = (stencil.tilt[3, 1] - stencil.tilt[1, 1]) / (2.0 * h)
-    dd_roll = (stencil.tilt[3, 0] - 2.0 * roll + stencil.tilt[1, 0]) / (h * h)
-    dd_pitch = (stencil.tilt[3, 1] - 2.0 * pitch + stencil.tilt[1, 1]) / (h * h)
+    before, here, after = stencil.attitude[1], stencil.attitude[2], stencil.attitude[3]
+    roll, pitch = here[0], here[1]
+    d_roll, d_pitch = (after[0] - before[0]) / (2.0 * h), (after[1] - before[1]) / (2.0 * h)
+    d_yaw = yaw_rate + (after[2] - before[2]) / (2.0 * h)
+    dd_roll = (after[0] - 2.0 * roll + before[0]) / (h * h)
+    dd_pitch = (after[1] - 2.0 * pitch + before[1]) / (h * h)
+    dd_yaw = (after[2] - 2.0 * here[2] + before[2]) / (h * h)
     s_roll, c_roll, s_pitch, c_pitch = math.sin(roll), math.cos(roll), math.sin(pitch), math.cos(pitch)
-    dp = dd_roll - c_pitch * d_pitch * yaw_rate
+    dp = dd_roll - c_pitch * d_pitch * d_yaw - s_pitch * dd_yaw
     dq = (
         c_roll * dd_pitch
         - s_roll * d_roll * d_pitch
-        + (c_roll * d_roll * c_pitch - s_roll * s_pitch * d_pitch) * yaw_rate
+        + (c_roll * d_roll * c_pitch - s_roll * s_pitch * d_pitch) * d_yaw
+        + s_roll * c_pitch * dd_yaw
     )
     dr = (
         -s_roll * dd_pitch
         - c_roll * d_roll * d_pitch
-        - (s_roll * d_roll * c_pitch + c_roll * s_pitch * d_pitch) * yaw_rate
+        - (s_roll * d_roll * c_pitch + c_roll * s_pitch * d_pitch) * d_yaw
+        + c_roll * c_pitch * dd_yaw
     )
     p, q, r = _body_rates(stencil, yaw_rate)
     i_x, i_y, i_z = b.inertia[0], b.inertia[1], b.inertia[2]
@@ -174,32 +216,60 @@ def _moments(b: Any, stencil: Any, yaw_rate: float, wrench: Array) -> None:
 
 @kernel
 def flat_motion(
-    b: Any, path: Any, t: float, lead: float, heading: Array, stencil: Any, state: Array, wrench: Array
+    b: Any,
+    path: Any,
+    t: float,
+    lead: float,
+    lag: float,
+    heading: Array,
+    stencil: Any,
+    state: Array,
+    wrench: Array,
 ) -> None:
     """x* (18,), eq. 31, at time t (s), and u* (4,) at t + lead, for a feasible path.
 
-    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading.
+    Lagging rotors (lag, s) are asked for u + lag·u' along a planned profile, whose seventh derivative is
+    bounded. Along any other path they are asked for u a lag ahead, the same to first order.
+    heading: (2,), cosine and sine of the path's yaw; roll and pitch of x* are towards this heading. Along a
+    planned profile the vehicle turns without twisting, which takes its nose a few degrees off the heading.
     """
     h = STENCIL_STEP
     for i in range(18):
         state[i] = 0.0
     state[17] = path.yaw
-    if not path.local and path.radius == 0.0 and t > path.ramp_time + (POINTS // 2) * h:  # at rest
-        feasible(path, t, stencil.derivatives, stencil.smooth_step)
-        _hang(b, stencil.derivatives, stencil.load[2], stencil.vehicle[2], stencil.pull[2])
+    at_rest = path.ramp_time + (POINTS // 2) * h + LAGS_TO_REST * path.cable_lag
+    if not path.local and path.radius == 0.0 and t > at_rest:
+        feasible(path, t, stencil.derivatives, stencil.profile)
+        _hang(b, path, t, stencil.derivatives, stencil.load[2], stencil.vehicle[2], stencil.pull[2])
+        weight = (b.vehicle_mass + b.load_mass) * b.gravity
         for i in range(3):
             state[i] = stencil.vehicle[2, i]
             state[3 + i] = stencil.load[2, i]
-        wrench[0], wrench[1], wrench[2], wrench[3] = (b.vehicle_mass + b.load_mass) * b.gravity, 0.0, 0.0, 0.0
+            stencil.force[2, i] = weight if i == 2 else 0.0
+        wrench[0], wrench[1], wrench[2], wrench[3] = weight, 0.0, 0.0, 0.0
         return
-    _lean(b, path, t + lead, heading, stencil)
+    exact = path.pieces > 0 and lag > 0.0
+    _lean(b, path, t + (2.0 * lead if exact else lead + lag), heading, stencil)
     wrench[0] = stencil.thrust[2]
     _moments(b, stencil, path.yaw_rate, wrench)
     _lean(b, path, t, heading, stencil)
+    if exact:
+        for k in range(4):
+            stencil.later[k] = wrench[k]
+        wrench[0] = stencil.thrust[2]
+        _moments(b, stencil, path.yaw_rate, wrench)
+        for k in range(4):  # value and slope at t + lead, by what is asked for at t and at t + 2·lead
+            slope = (stencil.later[k] - wrench[k]) / (2.0 * lead)
+            wrench[k] = 0.5 * (stencil.later[k] + wrench[k])
+            # Speeds lag, and thrust is their square: (w + lag·w')² = w² + lag·(w²)' + ((lag·(w²)')/(2 w))².
+            if k == 0:
+                wrench[0] += 0.25 * (lag * slope) ** 2 / wrench[0]
+            wrench[k] += lag * slope
     for i in range(3):
         state[i] = stencil.vehicle[2, i]
         state[3 + i] = stencil.load[2, i]
         state[6 + i] = (stencil.vehicle[3, i] - stencil.vehicle[1, i]) / (2.0 * h)
         state[9 + i] = (stencil.load[3, i] - stencil.load[1, i]) / (2.0 * h)
     state[12], state[13], state[14] = _body_rates(stencil, path.yaw_rate)
-    state[15], state[16] = stencil.tilt[2, 0], stencil.tilt[2, 1]
+    state[15], state[16] = stencil.attitude[2, 0], stencil.attitude[2, 1]
+    state[17] = path.yaw + stencil.attitude[2, 2]

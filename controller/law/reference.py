@@ -2,8 +2,9 @@
 
 A path is one flat record, so that compiled code evaluates it at every tick. `raw` gives the position that
 the paper feeds to its integrator, steps and all; `feasible` leaves the start smoothly, so that a feed-forward
-can follow it exactly. A path can also be given moment by moment (`local_path`), by somebody who shapes it as
-the flight goes on.
+can follow it exactly. How it leaves is a smooth step, or a profile that was planned for the vehicle
+(`design.ramp`). A path can also be given moment by moment (`local_path`), by somebody who shapes it as the
+flight goes on.
 """
 
 from __future__ import annotations
@@ -20,6 +21,13 @@ from sitl_bridge.compiled import kernel
 DERIVATIVES = 5
 """Derivatives of a feasible path that are continuous, the position's own not counted."""
 
+USUAL_AGILITY = 0.7
+
+MOST_PIECES = 24
+"""Of a planned profile."""
+PIECE_ORDER = 8
+"""Coefficients of a piece: polynomials of degree 7, which can join with six continuous derivatives."""
+
 PATH = np.dtype(
     [
         ("start", "f8", 3),  # m, where a feasible path leaves from, at rest
@@ -29,9 +37,18 @@ PATH = np.dtype(
         ("ramp_time", "f8"),  # s, in which a feasible path goes over from the start to the path
         ("yaw", "f8"),  # rad
         ("yaw_rate", "f8"),  # rad/s
+        ("agility", "f8"),  # 0, gentle, to 1, all there is: how fast a planned profile is to be
         ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
         ("epoch", "f8"),  # s, path time of `motion`
         ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
+        ("pieces", "i8"),  # of the planned profile, equal shares of the ramp time; 0: it is the smooth step
+        (
+            "profile",
+            "f8",
+            (MOST_PIECES, PIECE_ORDER),
+        ),  # share of the way, in powers of the share of the piece
+        ("cable_lag", "f8"),  # s, of the cable's length behind its tension; 0: `lengths` is not given
+        ("lengths", "f8", (MOST_PIECES, PIECE_ORDER)),  # m, of the cable along the ramp, likewise
     ]
 )
 
@@ -77,6 +94,7 @@ def circle(
     path = np.zeros(1, dtype=PATH)
     path["start"], path["centre"] = start, centre
     path["radius"], path["angular_rate"] = radius, angular_rate
+    path["agility"] = USUAL_AGILITY
     path["ramp_time"] = _ramp_time(path)
     return path
 
@@ -157,16 +175,52 @@ def smooth_step(s: float, out: Array) -> None:
 
 
 @kernel
+def piece_at(pieces: int, share: float) -> int:
+    """Which of equal pieces of 0..1 a share lies in."""
+    return min(pieces - 1, int(share * pieces))
+
+
+@kernel
+def polynomial(coefficients: Array, x: float) -> float:
+    """Value of a polynomial; coefficients: (PIECE_ORDER,), of rising powers."""
+    value = 0.0
+    for power in range(PIECE_ORDER - 1, -1, -1):
+        value = value * x + coefficients[power]
+    return value
+
+
+@kernel
+def profile(path: Any, share: float, out: Array) -> None:
+    """The planned profile at a share (0..1) of the ramp time, and its derivatives by the share: out (6,)."""
+    piece = piece_at(path.pieces, share)
+    x = share * path.pieces - piece
+    scale = 1.0
+    for k in range(DERIVATIVES + 1):
+        value = 0.0
+        for power in range(PIECE_ORDER - 1, k - 1, -1):
+            factor = path.profile[piece, power]
+            for j in range(k):
+                factor *= power - j
+            value = value * x + factor
+        out[k] = value * scale
+        scale *= path.pieces
+
+
+@kernel
 def feasible(path: Any, t: float, out: Array, scratch: Array) -> None:
     """The path, left smoothly from its start: row k of out (6, 3) is the k-th derivative at time t (s).
 
-    r = start + w(t)·(path - start), with w the smooth step over the ramp time (Leibniz for its derivatives).
+    r = start + w(t)·(path - start), with w from 0 to 1 over the ramp time (Leibniz for its derivatives).
     scratch: (6,).
     """
     path_derivatives(path, t, out)
     if path.local or t >= path.ramp_time:
         return
-    smooth_step(max(0.0, t) / path.ramp_time, scratch)
+    share = max(0.0, t) / path.ramp_time
+    if path.pieces > 0:
+        profile(path, share, scratch)
+    else:
+        smooth_step(share, scratch)
     scale = 1.0
     for k in range(DERIVATIVES + 1):
         scratch[k] *= scale

@@ -33,5 +33,5 @@ def path_motion(
     lead: float,
 ) -> int:
     """x* (18,), eq. 31, at a time of the path, and u* (4,) `lead` s later; heading as for `flat_motion`."""
-    flat_motion(bodies[0], paths[0], time_s, lead, heading, stencils[0], state, wrench)
+    flat_motion(bodies[0], paths[0], time_s, lead, 0.0, heading, stencils[0], state, wrench)
     return 0

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from controller.design.ramp import smoothly_planned
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation
@@ -94,7 +96,9 @@ class OwnLawPilot:
         if self.failure is not None:
             return
         if self._path is None:
-            self._path = planned_from(self._path_from, estimate, self._vehicle)
+            self._path = planned_from(
+                self._path_from, estimate, partial(smoothly_planned, vehicle=self._vehicle)
+            )
             self._ticks = 0
             self._reference_at = reference_at.bind(self._path, self._motion, self._raw, self._scratch)
         time_s = self._ticks / self._rate_hz

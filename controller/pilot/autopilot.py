@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from controller.design.catalogue import design
-from controller.design.ramp import planned
+from controller.design.names import ON_ESTIMATE
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation
@@ -19,10 +20,10 @@ from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle.description import Vehicle
 
 
-def planned_from(path_from: PathFrom, estimate: Array, vehicle: Vehicle) -> Path:
+def planned_from(path_from: PathFrom, estimate: Array, plan: Callable[[Path], Path]) -> Path:
     """The reference path of a law that takes over at an estimate (18,), as slow as the vehicle needs it."""
     load = estimate[LOAD_POSITION]
-    return planned(path_from((float(load[0]), float(load[1]), float(load[2]))), vehicle)
+    return plan(path_from((float(load[0]), float(load[1]), float(load[2]))))
 
 
 class Autopilot:
@@ -35,7 +36,9 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
-        self._vehicle = vehicle
+        from controller.design.ramp import planned  # scipy's optimizer: nothing else in flight takes it
+
+        self._plan = partial(planned, vehicle=vehicle, estimated=design_name == ON_ESTIMATE)
         self._path_from = path_from
         self._design = design(design_name, vehicle, rate_hz)
         self._allocation = allocation(vehicle)
@@ -56,7 +59,7 @@ class Autopilot:
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
         if self._step is None:
-            path = planned_from(self._path_from, estimate, self._vehicle)
+            path = planned_from(self._path_from, estimate, self._plan)
             memory = engaged_memory(estimate[LOAD_POSITION])
             law = (self._design, self._allocation, path, memory, np.zeros(1, dtype=WORK))
             self._step = control_step.bind(*law, estimate, self._controls)

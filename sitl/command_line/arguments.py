@@ -316,6 +316,13 @@ def _control(parser: argparse.ArgumentParser) -> None:
     )
     add_law(parser)
     parser.add_argument(
+        "--agility",
+        metavar="A",
+        type=number(0, 1, "an agility"),
+        help="how fast the load goes to its reference: 0, gentle, to 1, all that the vehicle can do "
+        "(default: the scenario's, else 0.7)",
+    )
+    parser.add_argument(
         "--feedback",
         choices=("truth", "estimate"),
         help="what the law flies on: the plant's truth, or the estimate from its sensors (default: truth for "

@@ -58,12 +58,14 @@ def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
 
 def _what_to_fly(arguments: argparse.Namespace, of_plant: bool = False) -> tuple[Vehicle, Scenario | None]:
     """Vehicle and scenario of `plant` or `controller`."""
-    overrides = _overrides(arguments)
+    overrides, agility = _overrides(arguments), None if of_plant else arguments.agility
     if arguments.scenario is None:
+        if agility is not None:
+            raise DescriptionError("--agility", ["is that of a scenario's reference; expected --scenario"])
         return load_vehicle(arguments.vehicle or "paper", overrides), None
-    from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle
+    from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle, with_agility
 
-    scenario = load_scenario(arguments.scenario)
+    scenario = with_agility(load_scenario(arguments.scenario), agility)
     its_vehicle = plant_vehicle if of_plant else scenario_vehicle
     return its_vehicle(scenario, arguments.vehicle, overrides), scenario
 
@@ -216,11 +218,11 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
     from sitl.flights.report import written
-    from sitl.flights.scenario import GroundControl, load_scenario
+    from sitl.flights.scenario import GroundControl, load_scenario, with_agility
     from sitl.terminal.summary import table
     from sitl_bridge.mavlink.links import Address
 
-    scenario = load_scenario(arguments.scenario)
+    scenario = with_agility(load_scenario(arguments.scenario), arguments.agility)
     with prints_to_stderr(arguments.law is not None):
         law = chosen_law(arguments, scenario)
     if arguments.over is not None:
@@ -243,6 +245,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         rate_hz=arguments.rate,
         seed=arguments.seed,
         design=arguments.design,
+        agility=arguments.agility,
         feedback=arguments.feedback,
         duration_s=arguments.duration,
         drop_percent=arguments.drop,

@@ -101,6 +101,7 @@ def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario
 NOT_OVER_A_STACK = {
     "in_process": "the stack is a process of its own",
     "design": "the companion has a design of its own",
+    "agility": "a stack is flown gently",
     "feedback": "--load says where the load is known from",
     "onboard": "--over is the link to the stack",
     "signing_key": "the link to the stack is not signed",

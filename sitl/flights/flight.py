@@ -69,6 +69,8 @@ class FlightOptions:
     """Plant and controller joined in this process, without sockets."""
     law: ChosenLaw | None = None
     """A law of the user's own, instead of the design."""
+    agility: float | None = None
+    """Of the reference, which the scenario has already; None: the scenario's own."""
     ground: Sequence[str] = ()
     """Arguments of the controller for its ground-control links."""
 
@@ -97,6 +99,8 @@ class FlightOptions:
         controller = [*common, "--hil", str(self.other_end), "--design", self.design]
         if self.law is not None:
             controller += ["--law", self.law.name]
+        if self.agility is not None:
+            controller += ["--agility", repr(self.agility)]
         if self.feedback is not None:
             controller += ["--feedback", self.feedback]
         if self.out is not None:

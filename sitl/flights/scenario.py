@@ -10,11 +10,24 @@ from pydantic import Field
 
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import Override, beside, is_path, load_vehicle, read_toml, shipped, validated
+from sitl_bridge.vehicle.files import (
+    DescriptionError,
+    Override,
+    beside,
+    is_path,
+    load_vehicle,
+    read_toml,
+    shipped,
+    validated,
+)
 from sitl_bridge.vehicle.schema import Section, Vector, quantity
 
 if TYPE_CHECKING:
     from controller.law.reference import Path
+
+
+def _agility() -> Any:
+    return quantity("-", "how fast: 0, gentle, to 1, all that the vehicle can do", None, ge=0, le=1)
 
 
 class Hover(Section):
@@ -34,12 +47,13 @@ class Setpoint(Section):
 
     kind: Literal["setpoint"]
     position: Vector = quantity("m", "world ENU")
+    agility: float | None = _agility()
 
     def path(self, start: Vector) -> Path:
         """The reference path for a load that is at `start` (m, world) when the flight begins."""
         from controller.law.reference import setpoint
 
-        return setpoint(self.position, start)
+        return _agile(setpoint(self.position, start), self.agility)
 
 
 class Circle(Section):
@@ -49,12 +63,20 @@ class Circle(Section):
     centre: Vector = quantity("m", "world ENU")
     radius: float = quantity("m", "of the circle", gt=0, le=1e3)
     angular_rate: float = quantity("rad/s", "w", ge=-10, le=10)
+    agility: float | None = _agility()
 
     def path(self, start: Vector) -> Path:
         """The reference path for a load that is at `start` (m, world) when the flight begins."""
         from controller.law.reference import circle
 
-        return circle(self.centre, self.radius, self.angular_rate, start)
+        return _agile(circle(self.centre, self.radius, self.angular_rate, start), self.agility)
+
+
+def _agile(path: Path, agility: float | None) -> Path:
+    """The path, with an agility other than the usual one if there is one."""
+    if agility is not None:
+        path["agility"] = agility
+    return path
 
 
 class GroundControl(Section):
@@ -80,6 +102,18 @@ class Scenario(Section):
     )
     reference: Reference
     faults: Faults = Faults()
+
+
+def with_agility(scenario: Scenario, agility: float | None) -> Scenario:
+    """The scenario with another agility of its reference; None: as it is. Raises DescriptionError."""
+    if agility is None:
+        return scenario
+    if not isinstance(scenario.reference, Setpoint | Circle):
+        raise DescriptionError(
+            "--agility", [f"a {scenario.reference.kind} reference has none; expected a set-point or a circle"]
+        )
+    reference = scenario.reference.model_copy(update={"agility": agility})
+    return scenario.model_copy(update={"reference": reference})
 
 
 def scenario_names() -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from controller.design.ramp import planned
 from controller.law.allocation import allocation
 from controller.law.flatness import STENCIL, body, flat_motion
 from controller.law.reference import Path, circle, feasible, setpoint
@@ -32,14 +33,14 @@ PATHS = {
 NAMES = ("paper", "paper, 10 m", "small", "small, drag", "large", "tiny, heavy load", "long")
 
 
-def flat(vehicle: Vehicle, path: Path, t: float, lead: float = 0.0) -> tuple[Array, Array]:
-    """x* (18,) at t and u* (4,) at t + lead."""
+def flat(vehicle: Vehicle, path: Path, t: float, lead: float = 0.0, lag: float = 0.0) -> tuple[Array, Array]:
+    """x* (18,) at t and u* (4,) at t + lead, for rotors that lag."""
     state, wrench = np.full(STATE_SIZE, np.nan), np.full(WRENCH_SIZE, np.nan)
     record = np.array([body(vehicle)], dtype=body(vehicle).dtype)
     scratch = attributes(np.zeros(1, dtype=STENCIL))
     yaw = float(path["yaw"][0])
     heading = np.array([np.cos(yaw), np.sin(yaw)])
-    flat_motion(attributes(record), attributes(path), t, lead, heading, scratch, state, wrench)
+    flat_motion(attributes(record), attributes(path), t, lead, lag, heading, scratch, state, wrench)
     return state, wrench
 
 
@@ -78,6 +79,67 @@ def test_the_motion_satisfies_the_plants_equations(name: str, path: Path) -> Non
     assert worst[6:12].max() < 3e-3 + 1.5 * cable_error  # m/s²
     assert worst[EULER_ANGLES].max() < 2e-3  # rad/s
     assert worst[BODY_RATES].max() < 0.05 + 0.01 * turning  # rad/s²
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_planned_motion_satisfies_them_with_the_damper(name: str) -> None:
+    """The cable's length is the damper's exactly, and the vehicle does not twist."""
+    vehicle, path = FLEET[name], planned(PATHS["V.B"], FLEET[name])
+    h = 1e-3
+    worst, largest = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE)
+    for t in np.linspace(0.05, float(path["ramp_time"][0]) + 1.0, 60):
+        state, wrench = flat(vehicle, path, t)
+        slope = (flat(vehicle, path, t + h)[0] - flat(vehicle, path, t - h)[0]) / (2.0 * h)
+        worst = np.maximum(worst, np.abs(plant_rates(vehicle, state, wrench) - slope))
+        largest = np.maximum(largest, np.abs(slope))
+        assert abs(state[BODY_RATES][2]) < 0.01
+    turning = float(largest[BODY_RATES].max())
+    assert worst[0:6].max() < 2e-4  # m/s, by differences over milliseconds, as are the next
+    assert worst[6:12].max() < 3e-3 + 2e-3 * largest[6:12].max()  # m/s²
+    assert worst[EULER_ANGLES].max() < 2e-3 + 4e-3 * largest[EULER_ANGLES].max()  # rad/s
+    assert worst[BODY_RATES].max() < 0.05 + 0.02 * turning  # rad/s²
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_length_follows_the_tension_behind_the_ramp(name: str) -> None:
+    """F = k (l - l0) + c l', by differences, until hover's length is reached."""
+    vehicle, path = FLEET[name], planned(PATHS["V.B"], FLEET[name])
+    cable, h = vehicle.cable, 1e-3
+    out, scratch = np.zeros((6, 3)), np.zeros(6)
+
+    def length(t: float) -> float:
+        state, _ = flat(vehicle, path, t)
+        return float(np.linalg.norm(state[VEHICLE_POSITION] - state[LOAD_POSITION]))
+
+    duration = float(path["ramp_time"][0])
+    for t in np.linspace(-0.1, 1.3 * duration, 40):
+        feasible(attributes(path), t, out, scratch)
+        drag = vehicle.load.drag
+        speed = float(np.linalg.norm(out[1]))
+        pull = vehicle.load.mass * out[2] + (drag.linear + drag.quadratic * speed) * out[1]
+        pull[2] += vehicle.load.mass * vehicle.gravity
+        given = cable.stiffness * (length(t) - cable.rest_length)
+        given += cable.damping * (length(t + h) - length(t - h)) / (2.0 * h)
+        assert given == pytest.approx(float(np.linalg.norm(pull)), rel=2e-3)
+    assert length(10.0 * duration) == pytest.approx(vehicle.hover_length)
+
+
+@pytest.mark.parametrize("name", ["small, lag", "large, lag"])
+def test_lagging_rotors_are_asked_for_what_gives_the_thrust(name: str) -> None:
+    """A speed that follows with the lag, squared, gives the thrust that the motion needs."""
+    vehicle = FLEET[name]
+    path = planned(PATHS["V.B"], vehicle)
+    lag, h = vehicle.rotors[0].time_constant, 1e-3
+    duration = float(path["ramp_time"][0])
+    given = float(np.sqrt(vehicle.hover_thrust))
+    errors, swings = [], []
+    for t in np.arange(0.0, duration, h):
+        asked = flat(vehicle, path, t, 0.5 * h, lag)[1][0]
+        needed = flat(vehicle, path, t + h)[1][0]
+        given += (1.0 - np.exp(-h / lag)) * (float(np.sqrt(asked)) - given)
+        errors.append(abs(given**2 - needed))
+        swings.append(abs(needed - vehicle.hover_thrust))
+    assert max(errors) < 0.02 * max(swings)
 
 
 @pytest.mark.parametrize("name", NAMES)

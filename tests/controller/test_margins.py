@@ -80,7 +80,8 @@ def test_the_matrix_is_the_law_on_the_linear_model(name: str, vehicle: str, told
     record = design(name, delayed(FLEET[vehicle], told), 100.0)
     delay = extra * 0.01
     start = np.zeros(len(model.A))
-    start[:STATE_SIZE] = 0.1 * np.random.default_rng(3).standard_normal(STATE_SIZE)
+    # Small: away from hover the law turns deviations into its reference's frame.
+    start[:STATE_SIZE] = 1e-5 * np.random.default_rng(3).standard_normal(STATE_SIZE)
     for inputs in ((1,), (0, 3), EVERY_INPUT):
         matrix = closed_loop_matrix(model, record, delay, inputs)
         z = np.zeros(len(matrix))
@@ -94,7 +95,7 @@ def test_the_matrix_is_the_law_on_the_linear_model(name: str, vehicle: str, told
             z = matrix @ z
             expected.append(z[LOAD_POSITION].copy())
         found = flown(model, record, delay, inputs, start, 60)
-        np.testing.assert_allclose(found, expected, atol=1e-9 * max(1.0, float(np.abs(expected).max())))
+        np.testing.assert_allclose(found, expected, atol=1e-6 * float(np.abs(expected).max()))
 
 
 @pytest.mark.parametrize("vehicle", FLEET.values(), ids=FLEET)

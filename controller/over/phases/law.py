@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from controller.design.ramp import planned
+from controller.design.ramp import smoothly_planned
 from controller.law.reference import setpoint
 from controller.law.state import (
     EULER_ANGLES,
@@ -60,7 +60,7 @@ def _plan(flight: Flight, estimate: Array) -> float:
     """Ramp time of the reference, s. This takes tenths of a second, as does the law's first step: both come
     before anything depends on them.
     """
-    path = planned(flight.reference(estimate[LOAD_POSITION]), flight.vehicle)
+    path = smoothly_planned(flight.reference(estimate[LOAD_POSITION]), flight.vehicle)
     CompanionLaw(flight.vehicle, flight.stack, flight.design, path).step(estimate, 0.0)
     return float(path["ramp_time"][0])
 

@@ -1,0 +1,74 @@
+"""The cable's length along a planned motion: behind its tension by c/k, which fast motions notice."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from scipy import linalg
+from scipy.interpolate import BSpline, PPoly
+
+from controller.law.reference import MOST_PIECES, PIECE_ORDER
+from controller.law.state import Array
+from sitl_bridge.vehicle.description import Cable
+
+_DEGREE = PIECE_ORDER - 1
+_KNOTS = np.concatenate([np.zeros(_DEGREE), np.linspace(0.0, 1.0, MOST_PIECES + 1), np.ones(_DEGREE)])
+SAMPLES = 32 * MOST_PIECES + 1
+"""Times along the motion at which the tension is taken"""
+SHORTEST_LAG = 1e-4
+"""s; a shorter one is left out."""
+_JOINED = 6
+"""Value and derivatives that the length has in common with hover before the motion, and with what follows."""
+_FASTEST_DECAY = 6.0
+"""Pieces of the motion over the lag; a faster decay behind the motion is over at once."""
+
+
+def cable_lag(cable: Cable) -> float:
+    """Time constant, s, of the cable's length behind its tension; 0: it follows at once."""
+    lag = cable.damping / cable.stiffness
+    return lag if lag >= SHORTEST_LAG else 0.0
+
+
+def planned_lengths(tension: Array, duration: float, cable: Cable) -> Array:
+    """Lengths, m, as pieces (MOST_PIECES, 8) over equal shares of the duration (s), in rising powers.
+
+    tension: (SAMPLES,), N, evenly spaced; at both ends it has been constant, and remains so. The length is
+    the solution of F = k (l - l0) + c l', as a spline that begins at rest and ends in the decay that follows.
+    """
+    steady = cable.rest_length + tension / cable.stiffness
+    length = lagging(steady, duration / (SAMPLES - 1), cable.damping / cable.stiffness)
+    columns, at_end = _columns()
+    coefficients = np.zeros(columns.shape[1])
+    coefficients[:_JOINED] = steady[0]
+    rate = duration * cable.stiffness / cable.damping
+    rest = length[-1] - steady[-1] if rate < _FASTEST_DECAY * MOST_PIECES else 0.0
+    decay = rest * (-rate) ** np.arange(float(_JOINED))
+    coefficients[-_JOINED:] = steady[-1] + np.linalg.solve(at_end, decay)
+    free = slice(_JOINED, len(coefficients) - _JOINED)
+    found, *_ = np.linalg.lstsq(columns[:, free], length - columns @ coefficients, rcond=None)
+    coefficients[free] = found
+    pieces = PPoly.from_spline(BSpline(_KNOTS, coefficients, _DEGREE)).c[::-1, _DEGREE:-_DEGREE].T
+    return np.asarray(pieces * MOST_PIECES ** -np.arange(float(PIECE_ORDER)))
+
+
+def lagging(steady: Array, spacing: float, lag: float) -> Array:
+    """What follows steady (n, …) with a lag, s: exact for what is linear between the samples."""
+    if lag <= 0.0:
+        return steady
+    decay = math.exp(-spacing / lag)
+    share = lag / spacing * (1.0 - decay)
+    driven = (share - decay) * steady[:-1] + (1.0 - share) * steady[1:]
+    powers = decay ** np.arange(float(len(steady)))
+    return np.asarray(np.tril(linalg.toeplitz(powers)) @ np.concatenate([steady[:1], driven]))
+
+
+@lru_cache(maxsize=1)
+def _columns() -> tuple[Array, Array]:
+    """The spline at the samples for each coefficient, and at the end its derivatives for the last ones."""
+    times = np.linspace(0.0, 1.0, SAMPLES)
+    count = len(_KNOTS) - _DEGREE - 1
+    spline = BSpline(_KNOTS, np.eye(count), _DEGREE)
+    ends = [spline.derivative(order)(1.0) if order else spline(1.0) for order in range(_JOINED)]
+    return np.asarray(spline(times)), np.array(ends)[:, -_JOINED:]
