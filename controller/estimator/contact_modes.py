@@ -66,7 +66,7 @@ DOUBT = 0.1
 DOUBTED_SPEED = 0.5
 """m/s, likewise"""
 USUAL_SWING = 0.12
-"""rad, of a load's swing when what holds the vehicle lets go of it."""
+"""rad, of a load's swing when what held the vehicle has let go of it. A slack cable does not swing."""
 STRETCH_STD = 0.02
 """Of the cable's length: how well a pull shows how long the cable is."""
 
@@ -108,6 +108,10 @@ def watch(f: Filter, measured: Any) -> None:
     floor = 3.0 * p.vehicle_mass * noise * math.sqrt(blend)
     floor = max(floor, 0.2 * weight)
     slack = pull < floor
+    if 0.0 < m.swing_due <= m.time:
+        m.swing_due = 0.0
+        if pull > LIGHT * weight and m.load_mode == LOAD_ON_CABLE:
+            doubt_swing(f)
     m.slack_time = m.slack_time + p.period if slack else 0.0
     surprising = not slack and (m.load_mode == LOAD_RELEASED or m.tension <= 0.0)
     m.pull_time = m.pull_time + p.period if surprising else 0.0
@@ -231,7 +235,7 @@ def leave_ground(f: Filter) -> None:
     for part in (LOAD, LOAD_VELOCITY):
         for i in range(part, part + 3):
             f.P[i, i] += f.p.initial_std[i] ** 2
-    doubt_swing(f)
+    f.m.swing_due = f.m.time + CONFIRM_TIME
 
 
 @kernel

@@ -158,6 +158,7 @@ MEMORY = np.dtype(
         ("command_count", "i8"),
         ("tension", "f8"),
         ("slack_time", "f8"),
+        ("swing_due", "f8"),
         ("pull", "f8", 3),
         ("pull_time", "f8"),
         ("hung", "f8", 2),
@@ -200,8 +201,9 @@ MEMORY = np.dtype(
 """What the filter remembers besides state and covariance.
 
 grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
-something below has carried the vehicle or the load; hung: m, world, where the load hung last with all its
-weight, and how well that was known relative to the vehicle.
+something below has carried the vehicle or the load;
+swing_due: when the pull will say whether a load that was let go hangs, and so may swing; 0: it has; hung: m,
+world, where the load hung last with all its weight, and how well that was known relative to the vehicle.
 last_change: of a sample from the one before; roughness: running mean of the change of that, in standard
 deviations of a live sensor's; last_fix: position and velocity of GPS, m and m/s.
 last_rate, first_refused: innovations of the gyroscope, rad/s, before and when it was first refused;
