@@ -197,8 +197,9 @@ def _member(union: FieldInfo, tag: str) -> type[BaseModel] | None:
 
 
 def _options(field: FieldInfo | None) -> list[str]:
-    """The words that a field can be; empty: it is no word."""
-    return [option for option in get_args(field.annotation) if isinstance(option, str)] if field else []
+    """The words or whole numbers that a field can be; empty: others, too."""
+    options = get_args(field.annotation) if field else ()
+    return [str(option) for option in options if isinstance(option, (str, int))]
 
 
 def comment_of(model: type[BaseModel], key: str) -> str:

@@ -134,7 +134,7 @@ def test_every_first_key_has_a_comment(capsys: pytest.CaptureFixture[str]) -> No
         (["--mass", "-1"], "mass = -1 kg: input should be greater than or equal to 0.2"),
         (["--mass", "nan"], "mass = nan kg"),
         (["--mass", "heavy"], "mass = 'heavy' kg: input should be a valid number"),
-        (["--mass", "2", "--rotors", "5"], "rotors = 5: input should be 4, 6 or 8"),
+        (["--mass", "2", "--rotors", "5"], "rotors = 5: no such value; allowed: 4 or 6 or 8"),
         (["--mass", "2", "--thrust-to-weight", "2", "--hover-throttle", "0.7"], "expected one"),
         (["--mass", "2", "--load-mass", "5"], "expected 0.04 to 3 kg"),
         (["--mass", "2", "--stretch", "3"], "stretch = 3 m: 1.8e+02 % of the cable"),
