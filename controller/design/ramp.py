@@ -67,7 +67,7 @@ def planned(path: Path, vehicle: Vehicle, estimated: bool = False) -> Path:
     out, vehicle = path.copy(), linearised(vehicle)
     if out["local"][0]:
         return out
-    if out["radius"][0] > 0.0:
+    if out["radius"][0] > 0.0 or out["unhurried"][0]:
         return smoothly_planned(path, vehicle)
     _plan_step(out, vehicle, limits_of(vehicle, float(path["agility"][0]), estimated))
     return out

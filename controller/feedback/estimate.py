@@ -201,7 +201,8 @@ class EstimateFeedback:
         """To where the description has the load at the start, which no sensor shows as well.
 
         The motion begins where the estimate has the load, metres away with some receivers: to begin elsewhere
-        would be a step. In flight, all of it is from where the estimate has it.
+        would be a step. In a hover that way is the estimate's own error, which is not hurried over. In
+        flight, all of it is from where the estimate has it.
         """
         start = self._vehicle.initial_load_position
 
@@ -209,6 +210,7 @@ class EstimateFeedback:
             if self.estimator.in_flight:
                 return path_from(load)
             path = path_from(start)
+            path["unhurried"] = np.array_equal(path["centre"], path["start"])
             path["start"] = load
             return path
 

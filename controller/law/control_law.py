@@ -145,7 +145,7 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
     """work.deviation = x - x*, work.feedforward = u*, work.reference = p_ref, at time t (s).
 
     The model is linear about hover at a yaw of zero: its x axis is the heading, its z axis the vertical.
-    Along a motion that was planned ahead its z axis is the cable's: an accelerated load hangs in its cable as
+    Along a circle or a planned profile its z axis is the cable's: an accelerated load hangs in its cable as
     one at rest does, only aslant and heavier. Deviations are turned into that frame. Roll and pitch are
     towards the heading anyway.
     """
@@ -179,7 +179,7 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
         work.desired[17] = path.yaw
     for i in range(STATE_SIZE):
         work.deviation[i] = estimate[i] - work.desired[i]
-    if design.entry == FEEDFORWARD and not path.local:
+    if design.entry == FEEDFORWARD and (path.pieces > 0 or path.radius > 0.0):
         _thrust_error(work.desired, estimate, work.deviation)
         upward = work.stencil.pull[2] if design.body.load_mass > 0.0 else work.stencil.force[2]
         _set_frame(work.heading, upward, work.frame)

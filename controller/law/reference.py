@@ -38,6 +38,7 @@ PATH = np.dtype(
         ("yaw", "f8"),  # rad
         ("yaw_rate", "f8"),  # rad/s
         ("agility", "f8"),  # 0, gentle, to 1, all there is: how fast a planned profile is to be
+        ("unhurried", "i8"),  # 1: it is left by a smooth step, not by the fastest motion
         ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
         ("epoch", "f8"),  # s, path time of `motion`
         ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
