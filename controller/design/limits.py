@@ -18,8 +18,11 @@ GENTLE_TENSION, LEAST_TENSION = 0.65, 0.15
 LEAST_THRUST = 0.1
 """Of hover's, of each rotor: rotors that stand do not steer."""
 
-ON_ESTIMATE = 25.0 / 39.0
-"""Of the tilt, that is used on the estimate: leaning, the accelerometer tells less about the vertical."""
+ON_ESTIMATE = 12.0 / 39.0
+"""Of the tilt, that is used on the estimate: leaning, the accelerometer tells less about the vertical.
+
+With 25 of 39 degrees `heavy` turned over in 4 of 48 set-points in weather, with 12 in none.
+"""
 
 
 class Limits(NamedTuple):

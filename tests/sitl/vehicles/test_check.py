@@ -8,6 +8,7 @@ import math
 import pytest
 
 from controller.design.catalogue import design
+from controller.design.limits import limits_of
 from controller.design.margins import closed_loop_matrix, spectral_radius
 from controller.design.model import actuated_model
 from sitl.command_line.commands import main
@@ -68,9 +69,10 @@ def test_a_shipped_vehicle_flies(name: str, capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize("damping", [51.0, 130.0])
 def test_a_cable_that_is_damped_beyond_its_bounce_is_flown(damping: float) -> None:
     """Its relaxation time, 0.5 and 1.3 s, is not short beside a step of two seconds."""
-    step = fly_step(load_vehicle("paper", [f"cable.damping={damping}"]), 1.0)
+    vehicle = load_vehicle("paper", [f"cable.damping={damping}"])
+    step = fly_step(vehicle, 1.0)
     assert step.outcome == "settled"
-    assert step.largest_tilt_deg < 35.0
+    assert step.largest_tilt_deg < math.degrees(limits_of(vehicle).tilt) + 1.0
 
 
 def test_a_vehicle_that_no_law_flies_is_code_1_with_the_reason(capsys: pytest.CaptureFixture[str]) -> None:
