@@ -53,7 +53,8 @@ def test_every_figure_fits_on_every_terminal(status: Status, width: int) -> None
         assert sorted(_words(shown)) == sorted(expected)
 
 
-def test_what_happened_is_said_once_and_stands_for_the_mode() -> None:
+def test_what_happened_is_said_once_and_stands_for_the_mode(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "120")  # the line of figures in one
     stream = io.StringIO()
     with Display(stream) as display:
         for condition in (None, "load lost", "load lost", "upside down"):
