@@ -20,6 +20,7 @@ from controller.estimator.records import (
     GPS_POSITION,
     GPS_VELOCITY,
     LOAD,
+    LOAD_DROPPED,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_RELEASED,
@@ -116,6 +117,11 @@ def watch(f: Filter, measured: Any) -> None:
     surprising = not slack and (m.load_mode == LOAD_RELEASED or m.tension <= 0.0)
     m.pull_time = m.pull_time + p.period if surprising else 0.0
     down = -m.pull[2]
+    if m.load_mode == LOAD_DROPPED:
+        if m.hook_closed and m.pull_time > CONFIRM_TIME and down > floor:
+            m.load_mode = LOAD_ON_GROUND
+            take_up(f, pull)
+        return
     if m.load_mode == LOAD_ON_GROUND:
         if m.pull_time > CONFIRM_TIME and down > floor:
             take_up(f, pull)
@@ -163,11 +169,18 @@ def lay_load(f: Filter) -> None:
 
     Since then the ground's force on it has been taken for something else, and misplaced it.
     """
-    p, m, x = f.p, f.m, f.x
+    m, x = f.m, f.x
     m.load_mode = LOAD_ON_GROUND
     for axis in range(2):
         x[X_LOAD + axis] = m.hung[axis] - x[X_POSITION + axis]
         set_part(f, LOAD + axis, 1, math.sqrt(m.hung_variance[axis]) + SET_DOWN_STD)
+    lie_still(f)
+
+
+@kernel
+def lie_still(f: Filter) -> None:
+    """The load lies on the ground below where it is: it has come to rest, and pulls no more."""
+    p, x = f.p, f.x
     x[X_LOAD + 2] = p.lying_height - x[X_POSITION + 2]
     lie_below(f)
     for axis in range(3):
@@ -230,7 +243,7 @@ def leave_ground(f: Filter) -> None:
     f.m.grounded = False
     f.m.contact_time = 0.0
     set_part(f, FORCE, 3, f.p.force_std)
-    if f.m.load_mode == LOAD_ON_GROUND:
+    if f.m.load_mode in (LOAD_ON_GROUND, LOAD_DROPPED):
         return
     for part in (LOAD, LOAD_VELOCITY):
         for i in range(part, part + 3):

@@ -18,6 +18,7 @@ from controller.estimator.records import (
     FLYING,
     GYROSCOPE,
     INPUT,
+    LOAD_DROPPED,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_RELEASED,
@@ -129,6 +130,8 @@ class Estimator:
         """Forget everything and align anew, at rest or in flight."""
         self._filter[...] = np.zeros((), dtype=FILTER)
         self._filter["p"] = parameters(self.vehicle, self.period, self.tuning)
+        self._filter_length = float(self._filter[0]["p"]["rest_length"])
+        """m, of the described cable, as the filter's model has it"""
         self._filter["transition"][0] = np.eye(ERROR_SIZE)
         self._filter["x"][0, X_ATTITUDE] = 1.0
         self._record[...] = np.zeros((), dtype=INPUT)
@@ -214,6 +217,12 @@ class Estimator:
         """
         self.memory["slip"][:3] = offset
 
+    def reeled(self, rest_length: float, rate: float) -> None:
+        """The winch has made the cable so long (m), and goes on at a rate (m/s, positive pays out)."""
+        p = self._filter[0]["p"]
+        p["rest_length"] = self._filter_length + rest_length - self.vehicle.cable.rest_length
+        p["reel_rate"] = rate
+
     def landed(self) -> None:
         """The vehicle stands on the ground, rotors stopped."""
         self._change(STANDING, int(self.memory["load_mode"]))
@@ -223,8 +232,13 @@ class Estimator:
         self._change(int(self.memory["vehicle_mode"]), LOAD_ON_GROUND)
 
     def load_released(self) -> None:
-        """The load is gone."""
-        self._change(int(self.memory["vehicle_mode"]), LOAD_RELEASED)
+        """The gripper has let the load go: it falls to the ground, if there is one."""
+        load = LOAD_DROPPED if self.tuning.has_ground else LOAD_RELEASED
+        self._change(int(self.memory["vehicle_mode"]), load)
+
+    def hook(self, closed: bool) -> None:
+        """Whether the gripper is to grab: a pull then shows that it has taken a load that was dropped."""
+        self.memory["hook_closed"] = closed
 
     @property
     def in_flight(self) -> bool:
@@ -248,7 +262,7 @@ class Estimator:
 
     @property
     def load_mode(self) -> int:
-        """LOAD_ON_CABLE, LOAD_ON_GROUND or LOAD_RELEASED."""
+        """LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED or LOAD_DROPPED."""
         return int(self.memory["load_mode"])
 
     @property
@@ -317,7 +331,7 @@ class Estimator:
             dead_reckoning=gps_age > 1.0,
             gps_glitch=refused > 0,
             gps_refused=refused * self.tuning.gps_period > REFUSED_TIME,
-            load_released=int(m["load_mode"]) == LOAD_RELEASED,
+            load_released=int(m["load_mode"]) in (LOAD_RELEASED, LOAD_DROPPED),
             position_std=position,
             height_std=height,
             velocity_std=velocity,

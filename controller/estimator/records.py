@@ -68,7 +68,8 @@ STALE_SENSORS = 3
 
 # What holds the vehicle, and what the load does.
 ALIGNING, STANDING, FLYING = 0, 1, 2
-LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED = 0, 1, 2
+LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED, LOAD_DROPPED = 0, 1, 2, 3
+"""Released: gone, nobody knows where to. Dropped: off its hook, and lying on the ground."""
 
 # Remembered instants, for measurements that arrive late: six numbers each.
 CLONES = 6
@@ -93,6 +94,7 @@ PARAMETERS = np.dtype(
         ("stiffness", "f8"),
         ("damping", "f8"),
         ("rest_length", "f8"),
+        ("reel_rate", "f8"),
         ("two_way", "b1"),
         ("has_ground", "b1"),
         ("starts_on_ground", "b1"),
@@ -134,9 +136,10 @@ PARAMETERS = np.dtype(
 )
 """What the filter needs of vehicle and tuning; see `tuning`. Densities are per square root of hertz.
 
-standing_height, lying_height: m, world, of vehicle and load at rest on the ground; *_drag: linear (N s/m) and
-quadratic (N s²/m²); gust_*: of white force on the vehicle beside the coloured one, m/s² as an accelerometer
-sees it and as the velocity feels it.
+rest_length, reel_rate: m and m/s, of the cable as the winch has it now; standing_height, lying_height: m,
+world, of vehicle and load at rest on the ground; *_drag: linear (N s/m) and quadratic (N s²/m²); gust_*: of
+white force on the vehicle beside the coloured one, m/s² as an accelerometer sees it and as the velocity feels
+it.
 """
 
 MEMORY = np.dtype(
@@ -144,6 +147,7 @@ MEMORY = np.dtype(
         ("time", "f8"),
         ("vehicle_mode", "i8"),
         ("load_mode", "i8"),
+        ("hook_closed", "b1"),
         ("align_count", "i8"),
         ("align_sum", "f8", 9),
         ("align_magnetometer", "i8"),
@@ -200,8 +204,9 @@ MEMORY = np.dtype(
 )
 """What the filter remembers besides state and covariance.
 
-grounded: a vehicle that stands does so on the ground, and is not held; contact_time, lying_time: s for which
-something below has carried the vehicle or the load;
+hook_closed: the gripper is to grab, so that a pull is that of a dropped load; grounded: a vehicle that stands
+does so on the ground, and is not held; contact_time, lying_time: s for which something below has carried the
+vehicle or the load;
 swing_due: when the pull will say whether a load that was let go hangs, and so may swing; 0: it has; hung: m,
 world, where the load hung last with all its weight, and how well that was known relative to the vehicle.
 last_change: of a sample from the one before; roughness: running mean of the change of that, in standard

@@ -19,6 +19,7 @@ from controller.estimator.correct.sensors import (
     on_ground,
     rest,
 )
+from controller.estimator.dropped_load import drop
 from controller.estimator.predict.process import predict
 from controller.estimator.records import (
     ALIGNING,
@@ -31,6 +32,7 @@ from controller.estimator.records import (
     GPS_POSITION,
     GPS_VELOCITY,
     INPUT,
+    LOAD_DROPPED,
     LOAD_ON_CABLE,
     LOAD_ON_GROUND,
     LOAD_OUT,
@@ -139,7 +141,7 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
         rest(f)
         if m.grounded and p.has_ground:
             on_ground(f)
-    if m.load_mode == LOAD_ON_GROUND:
+    if m.load_mode in (LOAD_ON_GROUND, LOAD_DROPPED):
         load_at_rest(f)
     report(f, out)
     return int(m.vehicle_mode)
@@ -164,6 +166,8 @@ def change(record: Any, vehicle_mode: int, load_mode: int) -> int:
     if load_mode != m.load_mode:
         if load_mode == LOAD_RELEASED:
             release(f)
+        elif load_mode == LOAD_DROPPED:
+            drop(f)
         elif load_mode == LOAD_ON_CABLE and m.load_mode == LOAD_RELEASED:
             start_hanging(f, 0.3, 1.0)
         m.load_mode = load_mode

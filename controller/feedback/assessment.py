@@ -35,8 +35,8 @@ class Contact(NamedTuple):
 class Assessor(Protocol):
     """Judges a feedback, for an autopilot under ground control."""
 
-    sees_free_load: bool
-    """Whether the estimate says where a load is that is off its cable"""
+    feels_hook: bool
+    """Whether only a pull shows that the hook has taken a load: where it lies is not known well enough"""
 
     def contact(self, estimate: Array) -> Contact:
         """What touches what at an estimate (18,), eq. 31."""
@@ -44,8 +44,11 @@ class Assessor(Protocol):
     def load_released(self) -> None:
         """The gripper has let the load go."""
 
-    def reeled(self, rest_length: float) -> None:
-        """The winch has made the cable so long, m."""
+    def hook(self, closed: bool) -> None:
+        """Whether the gripper is to grab."""
+
+    def reeled(self, rest_length: float, rate: float) -> None:
+        """The winch has made the cable so long (m), and goes on at a rate, m/s."""
 
     def assess(self, view: VehicleView) -> list[str]:
         """Write the health of sensors and estimate into the view; what there is to say."""
@@ -54,14 +57,14 @@ class Assessor(Protocol):
 class ExactAssessor:
     """For feedback that is the truth: geometry says what touches what, and all is well."""
 
-    sees_free_load = True
+    feels_hook = False
 
     def __init__(self, vehicle: Vehicle) -> None:
         cable = vehicle.cable
         # A cable that is stretched by all that the rotors can pull is as long as one can be.
         pull = full_thrust(vehicle.rotors)
         self._most_stretch = pull / cable.stiffness
-        self.reeled(cable.rest_length)
+        self.reeled(cable.rest_length, 0.0)
         ground = vehicle.ground
         self._vehicle_rest = self._load_rest = -math.inf
         if ground is not None:
@@ -86,7 +89,10 @@ class ExactAssessor:
     def load_released(self) -> None:
         """Truth does not need to know."""
 
-    def reeled(self, rest_length: float) -> None:
+    def hook(self, closed: bool) -> None:
+        """Truth does not need to know."""
+
+    def reeled(self, rest_length: float, rate: float) -> None:
         """Taut and lost are judged by the cable's length of now."""
         self._rest_length = rest_length
         self._lost_length = LOST_LOAD * (rest_length + self._most_stretch)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED, SENSORS
+from controller.estimator.records import LOAD_DROPPED, LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED, SENSORS
 from controller.feedback.assessment import Contact
 from controller.feedback.estimate import EstimateFeedback
 from controller.feedback.health_notices import HealthWatch, sensors_good
@@ -15,7 +15,7 @@ from controller.law.state import Array
 class EstimateAssessor:
     """Judges the estimate that an autopilot under ground control flies on."""
 
-    sees_free_load = False
+    feels_hook = True
 
     def __init__(self, feedback: EstimateFeedback) -> None:
         self._feedback = feedback
@@ -29,19 +29,24 @@ class EstimateAssessor:
         taut = aligned and load == LOAD_ON_CABLE and estimator.tension > 0.0
         return Contact(
             vehicle_on_ground=has_ground and (estimator.grounded or not aligned),
-            load_on_ground=has_ground and (load == LOAD_ON_GROUND or not aligned),
+            load_on_ground=has_ground and (load in (LOAD_ON_GROUND, LOAD_DROPPED) or not aligned),
             load_lifted=taut,
             cable_taut=taut,
-            load_attached=load != LOAD_RELEASED,
+            load_attached=load not in (LOAD_RELEASED, LOAD_DROPPED),
             in_flight=aligned and estimator.in_flight,
         )
 
-    def reeled(self, rest_length: float) -> None:
-        """The filter does not follow: the winch stands on estimates."""
+    def reeled(self, rest_length: float, rate: float) -> None:
+        """The filter's cable is as long."""
+        self._feedback.estimator.reeled(rest_length, rate)
 
     def load_released(self) -> None:
         """The filter's cable pulls no more."""
         self._feedback.estimator.load_released()
+
+    def hook(self, closed: bool) -> None:
+        """A pull then is that of a load that was dropped."""
+        self._feedback.estimator.hook(closed)
 
     def assess(self, view: VehicleView) -> list[str]:
         """Health and quality into the view; what there is to say."""

@@ -118,12 +118,9 @@ class GuidedAutopilot:
         self._designed_length = self._wanted_length = vehicle.cable.rest_length
         """m, of the cable that the gains are for, or will be"""
         self._designing = self._new_weights = False
-        winch = station.machine.winch
-        if winch is not None:
-            winch.followed = self._assessor.sees_free_load
         gripper = station.machine.gripper
         if gripper is not None:
-            gripper.sees_free_load = self._assessor.sees_free_load
+            gripper.feels_hook = self._assessor.feels_hook
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
         self._trajectory = Trajectory(self._period, motion_pole(vehicle.hover_length, vehicle.gravity))
         thrust = full_thrust(vehicle.rotors)
@@ -229,7 +226,7 @@ class GuidedAutopilot:
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
         view.acceleration = tuple(self._accelerometer.tolist())
         contact = self._assessor.contact(estimate)
-        self._work_gripper(view, now)
+        self._work_gripper(view, contact, now)
         if view.load_attached and not contact.load_attached:  # for good: it may well lie within reach again
             view.load_attached = False
             self.station.announce(Notice(WARNING, "The load is lost: flying without it"), now)
@@ -251,12 +248,11 @@ class GuidedAutopilot:
         length.
         """
         winch = self.station.machine.winch
-        if winch is None or not winch.followed:
+        if winch is None:
             return
         change = winch.length - self.station.profile.rest_length
         if change != 0.0:
             self.station.machine.reeled(change)
-            self._assessor.reeled(winch.length)
             self._designs[Body.LOAD]["body"]["rest_length"] = winch.length
         hangs = self._law is Body.LOAD
         self._trajectory.lower(change if hangs else 0.0, winch.speed if hangs else 0.0)
@@ -265,6 +261,7 @@ class GuidedAutopilot:
         if not self._designing and abs(winch.length / self._designed_length - 1.0) > REDESIGN_SHARE:
             self._request_designs(winch.length)
         winch.advance(self._period)
+        self._assessor.reeled(winch.length, winch.speed)
 
     def _request_designs(self, rest_length: float) -> None:
         p = self.station.parameters
@@ -272,10 +269,14 @@ class GuidedAutopilot:
         emphasis = EVEN._replace(**{field: p[name] for name, field in WEIGHTS.items()})
         self._redesigner.request(emphasis, rest_length)
 
-    def _work_gripper(self, view: VehicleView, now: float) -> None:
+    def _work_gripper(self, view: VehicleView, contact: Contact, now: float) -> None:
         """Fly without the load once the gripper has let it go, and with it once it has taken it."""
         gripper = self.station.machine.gripper
-        if gripper is None or not gripper.update(view, self.armed, self.station.profile.rest_length):
+        if gripper is None:
+            return
+        self._assessor.hook(self.armed and gripper.output > 0.0)
+        rest_length = self.station.profile.rest_length
+        if not gripper.update(view, self.armed, rest_length, contact.load_attached):
             return
         view.load_attached = not gripper.released
         if gripper.released:

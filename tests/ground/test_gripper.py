@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from controller.estimator.records import LOAD_DROPPED
+from controller.ground.flight.modes import Reposition
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
 from tests.ground.flown import Flown
@@ -102,9 +104,34 @@ def test_on_estimates_the_load_is_released_and_the_vehicle_stays(vehicle: str, h
     assert np.abs(estimate - estimate[0]).max() < 0.5
     assert np.ptp(truth[:, 2]) < 1.0
     assert flight.largest_tilt() < 0.6
-    taken = flight.machine.grip(GRAB)
-    assert taken.result == DENIED
-    assert "nothing shows" in taken.text
+
+
+@pytest.mark.parametrize(("vehicle", "height", "preset"), [("iris", 6.0, "consumer"), ("heavy", 14.0, "rtk")])
+def test_on_estimates_a_dropped_load_is_taken_again(vehicle: str, height: float, preset: str) -> None:
+    """The hook goes to where the load must have fallen; its pull shows that it has been taken."""
+    flight = GuidedFlight(load_vehicle(vehicle, [f"sensors.preset={preset}"]), 1)
+    flight.arm_and_take_off(height)
+    flight.wait(3.0)
+    for action in (RELEASE, GRAB):
+        assert flight.machine.grip(action).ok
+        flight.wait(3.0)
+    assert flight.feedback.estimator.load_mode == LOAD_DROPPED
+    believed = flight.feedback.estimator.state()[3:6]
+    _, load = flight.truth()
+    assert np.abs(believed - load).max() < 0.6
+    low = flight.vehicle.load.radius + flight.vehicle.cable.rest_length - 0.15
+    for aim in (low, height):
+        above = Reposition(False, (float(believed[0]), float(believed[1]), aim), NAN, NAN)
+        assert flight.machine.reposition(above, True).ok
+        assert "Load taken" not in flight.said
+        flight.wait(height / 0.7 + 8.0)
+    assert "Load taken" in flight.said
+    assert not [text for text in flight.said if "lost" in text]
+    vehicle_at, load = flight.truth()
+    assert vehicle_at[2] - load[2] == pytest.approx(flight.vehicle.hover_length, abs=0.05)
+    assert vehicle_at[2] == pytest.approx(height, abs=0.4)
+    error = flight.errors()[-1]
+    assert np.abs(error[3:6] - error[0:3]).max() < 0.35
 
 
 def test_a_release_before_the_take_off_waits_for_the_outputs() -> None:

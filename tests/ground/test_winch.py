@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from sitl_bridge.vehicle.files import load_vehicle
+from tests.estimator.guided import GuidedFlight
 from tests.ground.rig import NAN, Rig
 from tests.ground.test_gripper import ACCEPTED, DENIED, UNSUPPORTED, hovering
 
@@ -59,6 +61,26 @@ def test_relaxed_the_load_runs_out_until_it_lies() -> None:
     way = flight.flown(40.0)
     assert way.load[-1, 2] < 0.1
     assert np.abs(way.vehicle - before).max() < 0.5
+
+
+@pytest.mark.parametrize(("vehicle", "height", "preset"), [("iris", 9.0, "consumer"), ("heavy", 20.0, "rtk")])
+def test_on_estimates_the_filter_follows_the_cable(vehicle: str, height: float, preset: str) -> None:
+    flight = GuidedFlight(load_vehicle(vehicle, [f"sensors.preset={preset}"]), 1)
+    flight.arm_and_take_off(height)
+    flight.wait(3.0)
+    winch = flight.machine.winch
+    assert winch is not None
+    for way in (2.0, -2.0):
+        first, length = len(flight.rows), winch.length
+        winch.go_by(way, 0.0)
+        flight.wait(abs(way) / winch.description.rate + 6.0)
+        assert flight.simulation.world.reel().length == pytest.approx(length + way, abs=0.03)
+        errors = flight.errors()[first:]
+        assert np.abs(errors[:, 3:6] - errors[:, 0:3]).max() < 0.3
+        estimates = np.array([row[2][0:3] for row in flight.rows[first:]])
+        assert np.abs(estimates - estimates[0]).max() < 0.4
+    assert flight.feedback.estimator.memory["load_resets"] == 0
+    assert not [text for text in flight.said if "lost" in text]
 
 
 def test_what_is_no_action_is_denied() -> None:

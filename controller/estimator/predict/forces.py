@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from controller.estimator.records import (
+    LOAD_DROPPED,
     LOAD_RELEASED,
     X_LOAD,
     X_LOAD_VELOCITY,
@@ -19,14 +20,15 @@ from sitl_bridge.compiled import kernel
 def cable(f: Filter, jacobian: Array) -> tuple[float, float, float]:
     """The cable's force on the vehicle, N, world; writes its derivatives.
 
-    F = T e with T = k_a (l - l_0) + c_a dl/dt (eq. 9, corrected), e from vehicle to load.
+    F = T e with T = k_a (l - l_0) + c_a d(l - l_0)/dt (eq. 9, corrected), e from vehicle to load; a winch
+    changes l_0.
     jacobian: (18,) written: dF/d(load position) and dF/d(load velocity), 3x3 by rows; zero when slack.
     """
     p, x = f.p, f.x
     for i in range(18):
         jacobian[i] = 0.0
     f.m.tension = 0.0
-    if f.m.load_mode == LOAD_RELEASED:
+    if f.m.load_mode in (LOAD_RELEASED, LOAD_DROPPED):
         return 0.0, 0.0, 0.0
     rx, ry, rz = x[X_LOAD], x[X_LOAD + 1], x[X_LOAD + 2]
     sx, sy, sz = x[X_LOAD_VELOCITY], x[X_LOAD_VELOCITY + 1], x[X_LOAD_VELOCITY + 2]
@@ -34,7 +36,7 @@ def cable(f: Filter, jacobian: Array) -> tuple[float, float, float]:
     ex, ey, ez = rx / length, ry / length, rz / length
     rate = sx * ex + sy * ey + sz * ez
     extension = length - p.rest_length
-    tension = p.stiffness * extension + p.damping * rate
+    tension = p.stiffness * extension + p.damping * (rate - p.reel_rate)
     if not p.two_way and (extension <= 0.0 or tension <= 0.0):
         return 0.0, 0.0, 0.0
     f.m.tension = tension

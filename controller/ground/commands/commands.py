@@ -286,8 +286,6 @@ def _winch(c: Command, machine: Machine, requests: Requests, now: float) -> Verd
     winch = machine.winch
     if winch is None:
         return Verdict(UNSUPPORTED, "Winch denied: this vehicle has none; see [winch] in its file")
-    if not winch.followed:
-        return deny("Winch denied: the estimate does not follow the cable's length; fly on truth")
     if c.p2 == mavlink.WINCH_RELAXED:
         winch.relax()
     elif c.p2 == mavlink.WINCH_RELATIVE_LENGTH_CONTROL and math.isfinite(c.p3):

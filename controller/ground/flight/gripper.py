@@ -1,7 +1,7 @@
 """The gripper as ground control sees it: what it was told, what it has done by now.
 
-It reports nothing itself, as on most vehicles: the load is free a release time after the command, and taken
-when the hook is within reach of where the feedback sees the load.
+It reports nothing itself, as on most vehicles: the load is free a release time after the command. It is taken
+when the hook is within reach of it, by truth; on the estimate, when it pulls.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ class Gripper:
 
     def __init__(self, description: Description) -> None:
         self._description = description
-        self.sees_free_load = True
-        """Whether the feedback knows where a load is that is off the hook"""
+        self.feels_hook = False
+        """Only a pull shows that the hook has taken the load"""
         self.restart()
 
     def restart(self) -> None:
@@ -52,10 +52,10 @@ class Gripper:
         """Whether the last command has been carried out."""
         return self.action is None or self.released is (self.action == RELEASE)
 
-    def update(self, view: VehicleView, armed: bool, rest_length: float) -> bool:
+    def update(self, view: VehicleView, armed: bool, rest_length: float, attached: bool) -> bool:
         """Look at the vehicle; returns whether the load has just come off or on. Outputs act while armed.
 
-        rest_length: m, of the cable.
+        rest_length: m, of the cable; attached: whether the load pulls, or could, by the feedback.
         """
         if self.done or not armed:
             self._since = None
@@ -65,7 +65,7 @@ class Gripper:
                 self._since = view.time
             if view.time - self._since < self._description.release_time:
                 return False
-        elif not self.sees_free_load or not self._within_reach(view, rest_length):
+        elif not (attached if self.feels_hook else self._within_reach(view, rest_length)):
             return False
         self.released = self.action == RELEASE
         return True

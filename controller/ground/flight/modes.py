@@ -50,7 +50,7 @@ from controller.ground.commands.setpoints import Offboard, Setpoint
 from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
 from controller.ground.flight.fence import Fence
 from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
-from controller.ground.flight.gripper import GRAB, Gripper
+from controller.ground.flight.gripper import Gripper
 from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.patterns import Orbit, Pattern
@@ -310,8 +310,6 @@ class Machine:
         """Release (0) or grab (1) the load; done when the outputs are live and the hook is within reach."""
         if self.gripper is None:
             return Verdict(UNSUPPORTED, "Gripper denied: this vehicle has none; see [gripper] in its file")
-        if action == GRAB and self.gripper.released and not self.gripper.sees_free_load:
-            return deny("Gripper denied: nothing shows where the released load is; fly on truth to take it")
         self.gripper.act(action)
         return OK
 

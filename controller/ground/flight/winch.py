@@ -18,8 +18,6 @@ class Winch:
     def __init__(self, description: Description, rest_length: float) -> None:
         """rest_length: m, as described."""
         self.description = description
-        self.followed = True
-        """Whether the feedback that is flown on follows the rest length"""
         self._first = rest_length
         self.restart()
 
