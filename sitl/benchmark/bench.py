@@ -1,4 +1,4 @@
-"""`sitl bench`: how fast it is, beside what it could be. Nothing here judges; the ratios are for people."""
+"""`sitl bench`: how fast it is, beside what it could be; `limits` judges it."""
 
 from __future__ import annotations
 
@@ -17,8 +17,10 @@ import numpy as np
 from controller.hil.answers import AnswerWriter
 from controller.law.reference import setpoint
 from controller.pilot.autopilot import Autopilot
+from sitl.benchmark.footprint import log_figures, memory_figures
 from sitl.benchmark.ground import ground_figures
 from sitl.benchmark.gym import gym_figures
+from sitl.benchmark.in_process import in_process_figures, sweep_figures
 from sitl.benchmark.roundtrip import round_trip_us
 from sitl.command_line.arguments import DEFAULT_RATE_HZ
 from sitl.flights.free_ports import free_ports
@@ -43,6 +45,8 @@ FULL = (
 )
 """What makes `iris`, which has ground, rotor lag, drag and a battery, a plant with everything on."""
 ON_TRUTH, ON_ESTIMATE = ("--feedback", "truth"), ("--feedback", "estimate")
+LOSSY = ("--drop", "10")
+LOSSY_FLIGHT_S = 5.0
 WARMING_TICKS = 250
 
 
@@ -117,12 +121,15 @@ def estimator_update_us(vehicle: Vehicle) -> float:
     return statistics.median(times[WARMING_TICKS + 1 :]) * 1e6
 
 
-def lockstep_flight(scenario: str, *more: str, feedback: Sequence[str] = ON_TRUTH) -> dict[str, Any]:
+def lockstep_flight(
+    scenario: str, *more: str, feedback: Sequence[str] = ON_TRUTH, duration_s: float = FLIGHT_S
+) -> dict[str, Any]:
     """Fly a scenario in lockstep as fast as it goes, without logs; the plant's account of it."""
     [port] = free_ports(1)
     sensors = ["--set", "sensors.preset=consumer"] if feedback == ON_ESTIMATE else []
     common = ["--scenario", scenario, "--rate", str(DEFAULT_RATE_HZ), *sensors, *more]
-    plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep", "--duration", str(FLIGHT_S)]
+    plant = [*common, "--hil", f"udpout:127.0.0.1:{port}", "--clock", "lockstep"]
+    plant += ["--duration", str(duration_s)]
     controller = [*common, "--hil", f"udpin:127.0.0.1:{port}", *feedback]
     outcome = watch(Pair(plant, controller), StopRequest(), lambda event: None)
     if outcome.failure:
@@ -145,50 +152,80 @@ def launch_to_first_command_s(feedback: Sequence[str] = ()) -> float:
         return float(summary["first_command_unix_s"]) - launched
 
 
-def bench(repeats: int) -> dict[str, float]:
-    """Medians over so many repeats; progress on standard error."""
-    vehicle = load_vehicle("paper", ["cable.rest_length=10"])
-    consumer = load_vehicle("paper", ["cable.rest_length=10", "sensors.preset=consumer"])
-    full = load_vehicle("iris", FULL)
-    standing = load_vehicle("iris", [*FULL, "initial.start=ground"])
-    full_options = ["--vehicle", "iris", *(word for change in FULL for word in ("--set", change))]
-    sizes = datagram_sizes(vehicle)
+def bench(repeats: int) -> dict[str, list[float]]:
+    """So many samples of each figure; progress on standard error."""
     samples: dict[str, list[float]] = {}
     for repeat in range(repeats):
         print(f"bench: {repeat + 1} of {repeats}", file=sys.stderr, flush=True)
-        factor = lockstep_flight("setpoint")["real_time_factor"]
-        measured = {
-            "physics_step_us": physics_step_us(vehicle),
-            "control_step_us": control_step_us(vehicle),
-            "estimator_update_us": estimator_update_us(consumer),
-            "lockstep_tick_us": 1e6 / (factor * DEFAULT_RATE_HZ),
-            "round_trip_us": round_trip_us(*sizes, TRIPS),
-            "real_time_factor": factor,
-            "launch_to_first_command_s": launch_to_first_command_s(),
-        }
-        full_factor = lockstep_flight("hover", *full_options)["real_time_factor"]
-        measured["physics_step_us_full"] = physics_step_us(full)
-        measured["physics_step_us_ground_full"] = physics_step_us(standing)
-        measured["lockstep_tick_us_full"] = 1e6 / (full_factor * DEFAULT_RATE_HZ)
-        measured["physics_step_full_ratio"] = measured["physics_step_us_full"] / measured["physics_step_us"]
-        measured["lockstep_tick_full_ratio"] = (
-            measured["lockstep_tick_us_full"] / measured["lockstep_tick_us"]
-        )
-        estimated = lockstep_flight("setpoint", feedback=ON_ESTIMATE)["real_time_factor"]
-        measured["lockstep_tick_us_estimate"] = 1e6 / (estimated * DEFAULT_RATE_HZ)
-        measured["real_time_factor_estimate"] = estimated
-        measured["launch_to_first_command_s_estimate"] = launch_to_first_command_s(ON_ESTIMATE)
-        measured["lockstep_tick_estimate_ratio"] = (
-            measured["lockstep_tick_us_estimate"] / measured["lockstep_tick_us"]
-        )
-        measured |= ground_figures(DEFAULT_RATE_HZ)
-        measured |= gym_figures()
-        measured["lockstep_tick_per_round_trip"] = measured["lockstep_tick_us"] / measured["round_trip_us"]
-        for key, value in measured.items():
+        for key, value in _measured().items():
             samples.setdefault(key, []).append(value)
+    return samples
+
+
+def medians(samples: dict[str, list[float]]) -> dict[str, float]:
+    """The figures of a benchmark."""
     return {key: statistics.median(values) for key, values in samples.items()}
+
+
+def _measured() -> dict[str, float]:
+    """Every figure once; what is compared is measured close together."""
+    vehicle = load_vehicle("paper", ["cable.rest_length=10"])
+    consumer = load_vehicle("paper", ["cable.rest_length=10", "sensors.preset=consumer"])
+    factor = lockstep_flight("setpoint")["real_time_factor"]
+    estimated = lockstep_flight("setpoint", feedback=ON_ESTIMATE)["real_time_factor"]
+    found = {
+        "physics_step_us": physics_step_us(vehicle),
+        "control_step_us": control_step_us(vehicle),
+        "estimator_update_us": estimator_update_us(consumer),
+        "lockstep_tick_us": _tick_us(factor),
+        "round_trip_us": round_trip_us(*datagram_sizes(vehicle), TRIPS),
+        "real_time_factor": factor,
+        "lockstep_tick_us_estimate": _tick_us(estimated),
+        "real_time_factor_estimate": estimated,
+    }
+    found |= in_process_figures(DEFAULT_RATE_HZ)
+    found |= {
+        "lockstep_tick_per_round_trip": found["lockstep_tick_us"] / found["round_trip_us"],
+        "lockstep_tick_estimate_per_round_trip": found["lockstep_tick_us_estimate"] / found["round_trip_us"],
+        "lockstep_tick_estimate_ratio": found["lockstep_tick_us_estimate"] / found["lockstep_tick_us"],
+        "in_process_tick_ratio": found["in_process_tick_us"] / found["lockstep_tick_us"],
+        "in_process_tick_estimate_ratio": found["in_process_tick_us_estimate"]
+        / found["lockstep_tick_us_estimate"],
+        "lossy_real_time_factor": lockstep_flight("setpoint", *LOSSY, duration_s=LOSSY_FLIGHT_S)[
+            "real_time_factor"
+        ],
+        "launch_to_first_command_s": launch_to_first_command_s(),
+        "launch_to_first_command_s_estimate": launch_to_first_command_s(ON_ESTIMATE),
+    }
+    found |= _full_figures(found["physics_step_us"], found["lockstep_tick_us"])
+    found |= ground_figures(DEFAULT_RATE_HZ)
+    hovering = _tick_us(
+        lockstep_flight("hover", "--vehicle", "iris", feedback=ON_ESTIMATE)["real_time_factor"]
+    )
+    found |= {"hover_tick_us": hovering, "hold_tick_ratio": found["lockstep_tick_us_ground"] / hovering}
+    return found | memory_figures() | log_figures() | gym_figures() | sweep_figures()
+
+
+def _full_figures(step_us: float, tick_us: float) -> dict[str, float]:
+    """With everything on that the plant can do, over the plain step and tick."""
+    options = ["--vehicle", "iris", *(word for change in FULL for word in ("--set", change))]
+    standing = [*FULL, "initial.start=ground"]
+    found = {
+        "physics_step_us_full": physics_step_us(load_vehicle("iris", FULL)),
+        "physics_step_us_ground_full": physics_step_us(load_vehicle("iris", standing)),
+        "lockstep_tick_us_full": _tick_us(lockstep_flight("hover", *options)["real_time_factor"]),
+    }
+    return {
+        **found,
+        "physics_step_full_ratio": found["physics_step_us_full"] / step_us,
+        "lockstep_tick_full_ratio": found["lockstep_tick_us_full"] / tick_us,
+    }
+
+
+def _tick_us(real_time_factor: float) -> float:
+    return 1e6 / (real_time_factor * DEFAULT_RATE_HZ)
 
 
 def table(results: dict[str, float]) -> str:
     """The results for people."""
-    return "\n".join(f"  {key:<32}{value:10.3f}" for key, value in results.items())
+    return "\n".join(f"  {key:<40}{value:10.3f}" for key, value in results.items())

@@ -142,6 +142,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     bench.add_argument("--json", action="store_true", help="one JSON object on standard output")
     bench.add_argument(
+        "--check",
+        action="store_true",
+        help="print the figures that have a limit, with it and the measured spread; exit code 1 where one is "
+        "missed by more than its spread",
+    )
+    bench.add_argument(
         "--repeats", type=whole(1, 100, "a number"), default=5, help="measurements of each, for the median"
     )
 

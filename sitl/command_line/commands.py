@@ -284,16 +284,27 @@ def _fly(arguments: argparse.Namespace) -> int:
 
 
 def _bench(arguments: argparse.Namespace) -> int:
-    from sitl.benchmark.bench import bench, table
+    from sitl.benchmark.bench import bench, medians, table
+    from sitl.benchmark.limits import check_all, check_table
     from sitl.flights.launch import FlightError
+    from sitl.warmup import warm_up
 
     try:
-        results = bench(arguments.repeats)
-    except FlightError as error:
+        warm_up()
+        samples = bench(arguments.repeats)
+    except (FlightError, RuntimeError) as error:
         print(f"bench: {error}", file=sys.stderr)
         return FAILED
-    print(json.dumps(results, indent=2) if arguments.json else table(results))
-    return 0
+    if not arguments.check:
+        results = medians(samples)
+        print(json.dumps(results, indent=2) if arguments.json else table(results))
+        return 0
+    checked = check_all(samples)
+    if arguments.json:
+        print(json.dumps({row.limit.key: row.plain() for row in checked}, indent=2))
+    else:
+        print(check_table(checked))
+    return FAILED if any(row.verdict == "missed" for row in checked) else 0
 
 
 def _paper(arguments: argparse.Namespace) -> int:

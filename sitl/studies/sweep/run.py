@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from sitl.studies.sweep.cluster import as_they_come, cluster
 from sitl.studies.sweep.dataset import IDENTITY, read_rows, write_rows
 from sitl.studies.sweep.draws import Draw, draws
 from sitl.studies.sweep.page import write_page
@@ -18,7 +18,6 @@ from sitl.studies.sweep.study import Study, load_study
 from sitl.studies.sweep.verdicts import Judged, judge
 from sitl.studies.sweep.worker import fly_draw
 from sitl_bridge.process import StopRequest
-from sitl_bridge.vehicle.files import DescriptionError
 
 BATCH = 16
 """Flights that a worker is given at once."""
@@ -75,40 +74,38 @@ def _fly(
     study: Study, missing: Sequence[Draw], options: SweepOptions, stop: StopRequest
 ) -> dict[str, dict[str, Any]]:
     """Rows by identity; each is on disk within seconds."""
-    from distributed import as_completed
-
     known: dict[str, dict[str, Any]] = {}
     unwritten: list[dict[str, Any]] = []
-    plain = study.model_dump(mode="json")
-    size = max(1, min(BATCH, len(missing) // 8))
-    batches = [missing[k : k + size] for k in range(0, len(missing), size)]
-    with _client(options) as client:
+    with cluster(options.workers, options.scheduler) as client:
         progress = _Progress(len(missing))
         written_at = time.monotonic()
-        futures = [
-            client.submit(fly_batch, plain, [draw._asdict() for draw in batch], str(options.out), pure=False)
-            for batch in batches
-        ]
+        arguments = study.model_dump(mode="json"), str(options.out)
+        coming = as_they_come(client, fly_batch, batches_of(missing), *arguments)
         try:
-            for future in as_completed(futures):
-                for row in future.result():
-                    known[row[IDENTITY]] = row
-                    unwritten.append(row)
+            for rows in coming:
+                known |= {row[IDENTITY]: row for row in rows}
+                unwritten += rows
                 progress.show(len(known))
                 if time.monotonic() - written_at > WRITE_INTERVAL:
                     write_rows(options.out, unwritten)
                     unwritten, written_at = [], time.monotonic()
                 if stop:
                     _say(f"stopped by {stop.reason}; the same command goes on from here")
-                    client.cancel(futures)
                     break
         finally:
             write_rows(options.out, unwritten)
+            coming.close()
         progress.end()
     return known
 
 
-def fly_batch(study: dict[str, Any], batch: list[dict[str, Any]], out: str) -> list[dict[str, Any]]:
+def batches_of(missing: Sequence[Draw]) -> list[list[dict[str, Any]]]:
+    """Draws in batches for the workers, small enough that all are busy to the end."""
+    size = max(1, min(BATCH, len(missing) // 8))
+    return [[draw._asdict() for draw in missing[k : k + size]] for k in range(0, len(missing), size)]
+
+
+def fly_batch(batch: list[dict[str, Any]], study: dict[str, Any], out: str) -> list[dict[str, Any]]:
     """Rows of some draws; runs in a worker."""
     rows = []
     for draw in batch:
@@ -120,34 +117,6 @@ def fly_batch(study: dict[str, Any], batch: list[dict[str, Any]], out: str) -> l
 
 def _versions() -> str:
     return " ".join(f"{name} {metadata.version(name)}" for name in ("sitl-bridge", "numpy"))
-
-
-@contextlib.contextmanager
-def _client(options: SweepOptions) -> Iterator[Any]:
-    """A client of the scheduler that was asked for, or of a local cluster that ends with it."""
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise DescriptionError(
-            "sitl sweep",
-            ["needs Dask: pip install 'sitl-bridge[study]' (or: pip install 'dask[distributed]')"],
-        ) from None
-    if options.scheduler is not None:
-        with Client(options.scheduler, timeout=10) as client:
-            yield client
-        return
-    with (
-        LocalCluster(
-            n_workers=options.workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            host="127.0.0.1",
-            silence_logs=50,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        yield client
 
 
 class _Progress:
