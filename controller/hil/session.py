@@ -17,7 +17,7 @@ from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
 from controller.law.control_law import Law
 from controller.law.state import Array
-from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_TRUTH, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
 from sitl_bridge.mavlink.hil import ODOMETRY
 
@@ -27,6 +27,11 @@ REQUEST_INTERVAL = 0.2
 """Between two requests for truth, s."""
 HIL_STATE_QUATERNION = common.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 PX4_STATE_INTERVAL_US = 5000  # what PX4 asks a simulator for on connecting
+
+
+def is_plant_heartbeat(frame: Frame) -> bool:
+    """Whether the plant says that it is there while its time stands still or runs slowly."""
+    return frame.message_id == common.MAVLINK_MSG_ID_HEARTBEAT and frame.component == COMPONENT_TRUTH
 
 
 class Pilot(Protocol):
@@ -106,6 +111,8 @@ class HilSession:
         for frame in tick.others:
             self._autopilot.hear(frame, now)
         if tick.time_usec is None:
+            if self._last_heard is not None and any(map(is_plant_heartbeat, tick.others)):
+                self._last_heard = now
             return
         if self._last_answer is None:
             self._connect()

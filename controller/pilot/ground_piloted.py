@@ -29,6 +29,7 @@ from controller.ground.flight.trajectory import Limits, Trajectory, motion_pole
 from controller.ground.link.packing import decoded
 from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import VehicleView
+from controller.hil.session import is_plant_heartbeat
 from controller.hil.ticks import TickReader
 from controller.law import bumpless_transfer as handover
 from controller.law.allocation import allocation
@@ -173,6 +174,8 @@ class GuidedAutopilot:
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.hear_plant(frame, now)
+        if is_plant_heartbeat(frame):  # its time stands still: nothing is lost
+            self._heard = now
         winch = self.station.machine.winch
         if frame.message_id == common.MAVLINK_MSG_ID_WINCH_STATUS and winch is not None:
             status = decoded(frame)

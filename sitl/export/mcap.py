@@ -89,6 +89,7 @@ class _FlightWriter:
         home = recording.vehicle.home
         self._origin = LocalOrigin(home.latitude, home.longitude, home.altitude)
         self._positions = {body: recording.vectors(f"{body}_{{}}_m") for body in BODIES}
+        self._nodes = recording.nodes()
         self._attitude = recording.vectors("attitude_q{}", "wxyz")
         self._control_rows = recording.controls()
         errors = np.linalg.norm(self._positions["load"] - recording.reference, axis=1)
@@ -107,8 +108,9 @@ class _FlightWriter:
         """What moves: frames, poses, cable, and the rows of numbers."""
         log_time, stamp = self._time(float(self._recording.times[row]))
         self._log_poses(row, log_time, stamp)
-        ends = [tuple(self._positions[body][row].tolist()) for body in BODIES]
-        entity = self._scene.cable_entity(stamp, ends, float(self._load_shares[row]))
+        top, bottom = (self._positions[body][row].tolist() for body in BODIES)
+        points = [top, *self._nodes[row].tolist(), bottom]
+        entity = self._scene.cable_entity(stamp, points, float(self._load_shares[row]))
         self._cable.log(self._m.SceneUpdate(entities=[entity]), log_time=log_time)
         states = self._recording.states
         self._states.log({name: _finite(states[name][row]) for name in self._state_names}, log_time=log_time)

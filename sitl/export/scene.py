@@ -27,14 +27,15 @@ def _line(points: list[Point], thickness: float, color: Any) -> Any:
     )
 
 
-def cable_entity(stamp: Any, ends: list[Point], load_share: float) -> Any:
-    """The cable as a line in the world, grey while slack, from green to red at twice the load's weight.
+def cable_entity(stamp: Any, points: list[Point], load_share: float) -> Any:
+    """The cable as a line in the world, through a chain's nodes.
 
+    It is grey while slack, and from green to red at twice the load's weight.
     load_share: tension over the load's weight.
     """
     red = min(1.0, max(0.0, 0.5 * load_share))
     color = _SLACK if load_share <= 0.0 else m.Color(r=red, g=1.0 - red, b=0.1, a=1.0)
-    return m.SceneEntity(timestamp=stamp, frame_id="world", id="cable", lines=[_line(ends, 2.0, color)])
+    return m.SceneEntity(timestamp=stamp, frame_id="world", id="cable", lines=[_line(points, 2.0, color)])
 
 
 def vehicle_entity(stamp: Any, vehicle: Vehicle) -> Any:

@@ -59,6 +59,12 @@ class Recording:
         """Columns (n, k) of the state log whose names differ in one letter: `load_{}_m`."""
         return np.stack([self.states[pattern.format(letter)] for letter in letters], axis=1)
 
+    def nodes(self) -> Array:
+        """(n, nodes, 3), m: of a chain, from the top; another cable has none."""
+        count = sum(name.startswith("node_") for name in self.states) // 3
+        nodes = [self.vectors(f"node_{i + 1}_{{}}_m") for i in range(count)]
+        return np.stack(nodes, axis=1) if nodes else np.zeros((len(self.times), 0, 3))
+
     def controls(self) -> Array:
         """(n, rotors): rotor speeds over the largest."""
         speeds = self.vectors("rotor_{}_rad_s", [str(i + 1) for i in range(len(self.vehicle.rotors))])

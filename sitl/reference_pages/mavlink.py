@@ -22,9 +22,13 @@ PLANT_SENDS = {
     "HIL_STATE_QUATERNION": "the truth, when SET_MESSAGE_INTERVAL asks for it; to viewers (`--truth-to`)",
     "ODOMETRY": "the truth of vehicle and load, when SET_MESSAGE_INTERVAL asks for it; to viewers",
     "HIL_ACTUATOR_CONTROLS": "the rotors, to viewers",
-    "HEARTBEAT": "of the load, once a second",
+    "HEARTBEAT": "of the load, once a second; of the plant, four times a second, while it is paused",
     "GLOBAL_POSITION_INT": "of the load, five times a second; also `--load-to`",
-    "BATTERY_STATUS": "twice a second, of a vehicle with a battery",
+    "BATTERY_STATUS": "twice a second, of a vehicle with a battery; to viewers, too",
+    "NAMED_VALUE_FLOAT": "`tension` (N) and `scenario` (s since it began), to viewers",
+    "DEBUG_FLOAT_ARRAY": "`chain`: the nodes of a chain (m, NED, from the top), to viewers",
+    "WIND_COV": "at the vehicle, to viewers",
+    "PARAM_VALUE": "of SIM_SPEEDUP and SIM_STEPS, to a viewer that asks",
     "LANDING_TARGET": "of the load, by a vehicle with a load tracker",
     "WINCH_STATUS": "twenty times a second, of a vehicle with a winch",
     "COMMAND_ACK": "to COMMAND_LONG",
@@ -33,6 +37,11 @@ PLANT_TAKES = {
     "HIL_ACTUATOR_CONTROLS": "the answer to a tick: rotor commands, and whether it is armed",
     "COMMAND_LONG": "SET_MESSAGE_INTERVAL for truth, INJECT_FAILURE; anything else is refused",
     "HEARTBEAT": "needs no reaction",
+}
+VIEWERS_SEND = {
+    "PARAM_SET": "of SIM_SPEEDUP, SIM_STEPS: pause, slow motion, steps, in lockstep ([view](../view.md))",
+    "PARAM_REQUEST_READ": "answered by PARAM_VALUE",
+    "PARAM_REQUEST_LIST": "answered by PARAM_VALUE",
 }
 ABOUT = "https://mavlink.io/en/messages/common.html"
 
@@ -59,6 +68,7 @@ def markdown() -> str:
             *_table("when", _hil(PLANT_SENDS)),
         ],
         ["## From the autopilot to the plant (HIL link)", "", *_table("", _hil(PLANT_TAKES))],
+        ["## From viewers to the plant (`--truth-to`)", "", *_table("", _hil(VIEWERS_SEND))],
     )
 
 

@@ -27,8 +27,10 @@ from sitl_bridge.frames import (
     quaternion_from_euler,
     yaw_from_heading,
 )
-from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD, load_system
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD, COMPONENT_TRUTH, load_system
 from sitl_bridge.mavlink.framing import Frame, Packer, decode, split
+from sitl_bridge.plant.wire.figures import CHAIN, SCENARIO_TIME, TENSION
+from sitl_bridge.plant.wire.speed import SPEED, STEPS
 
 STATION_SYSTEM = 254
 """Ours; 255 is QGroundControl's."""
@@ -50,12 +52,14 @@ class Listener:
     """What one vehicle and its load say.
 
     home: where the world's origin lies, if it is known; else the first position is the origin.
+    node_count: of the vehicle's cable, if it is a chain.
     """
 
-    def __init__(self, home: LocalOrigin | None = None) -> None:
+    def __init__(self, home: LocalOrigin | None = None, node_count: int = 0) -> None:
         self.view = View()
         """What is known now."""
         self._origin = home
+        self._node_count = node_count
         self._checked_home = False
         self._vehicle_system: int | None = None
         self._station = Packer(STATION_SYSTEM, mavlink.MAV_COMP_ID_MISSIONPLANNER)
@@ -65,6 +69,7 @@ class Listener:
         self._sources: dict[str, tuple[int, float]] = {}
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._first_usec: int | None = None
+        self._plant_system: int | None = None
 
     def next_deadline(self) -> float:
         """When `to_send` has something at the latest."""
@@ -79,7 +84,19 @@ class Listener:
                 mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
             )
             out.append(self._station.pack(heartbeat))
+            if self._plant_system is not None and not self.view.steerable:
+                wanted = mavlink.MAVLink_param_request_list_message(self._plant_system, COMPONENT_TRUTH)
+                out.append(self._station.pack(wanted))
         return out
+
+    def set_plant(self, name: str, value: float) -> None:
+        """Set a parameter of the plant, if there is one to set: SIM_SPEEDUP or SIM_STEPS."""
+        if self._plant_system is None or not self.view.steerable:
+            return
+        message = mavlink.MAVLink_param_set_message(
+            self._plant_system, COMPONENT_TRUTH, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32
+        )
+        self._out.append(self._station.pack(message))
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take in what somebody says."""
@@ -166,7 +183,18 @@ class Listener:
         attitude = attitude_to_enu_flu(tuple(message.q))
         self._place(frame, _ODOMETRY, now, enu_to_ned((message.x, message.y, message.z)), attitude)
 
+    def _on_parameter(self, frame: Frame, message: Any, now: float) -> None:
+        """The plant's: one that counts steps can be paused."""
+        if frame.system != self._plant_system or frame.component != COMPONENT_TRUTH:
+            return
+        if message.param_id == STEPS:
+            self.view = replace(self.view, steerable=True)
+        if message.param_id == SPEED:
+            self.view = replace(self.view, speed=message.param_value)
+
     def _on_state(self, frame: Frame, message: Any, now: float) -> None:
+        if frame.component == COMPONENT_TRUTH:
+            self._plant_system = frame.system
         self._clock(message.time_usec)
         attitude = attitude_to_enu_flu(tuple(message.attitude_quaternion))
         self._place(frame, _TRUTH, now, self._local(message), attitude)
@@ -205,12 +233,30 @@ class Listener:
         if all(map(math.isfinite, target)):
             self.view = replace(self.view, set_point=target)
 
+    def _on_figure(self, frame: Frame, message: Any, now: float) -> None:
+        """The plant's own figures; see `plant.wire.figures`."""
+        if message.name == TENSION:
+            self.view = replace(self.view, tension=message.value)
+        elif message.name == SCENARIO_TIME and math.isfinite(message.value):
+            self._first_usec = 1000 * message.time_boot_ms - round(message.value * 1e6)
+            self.view = replace(self.view, time_s=message.value)
+
+    def _on_array(self, frame: Frame, message: Any, now: float) -> None:
+        name = message.name.rstrip("\0") if isinstance(message.name, str) else ""
+        if name != CHAIN or not all(map(math.isfinite, message.data)):
+            return
+        count = self._node_count
+        parts = message.data[: 3 * count]
+        nodes = tuple(enu_to_ned((parts[3 * i], parts[3 * i + 1], parts[3 * i + 2])) for i in range(count))
+        self.view = replace(self.view, nodes=nodes)
+
     def _on_wind(self, frame: Frame, message: Any, now: float) -> None:
         self.view = replace(self.view, wind=enu_to_ned((message.wind_x, message.wind_y, message.wind_z)))
 
 
 _HANDLERS = {
     mavlink.MAVLINK_MSG_ID_HEARTBEAT: Listener._on_heartbeat,
+    mavlink.MAVLINK_MSG_ID_PARAM_VALUE: Listener._on_parameter,
     mavlink.MAVLINK_MSG_ID_ODOMETRY: Listener._on_odometry,
     mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION: Listener._on_state,
     mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: Listener._on_global_position,
@@ -222,4 +268,6 @@ _HANDLERS = {
     mavlink.MAVLINK_MSG_ID_STATUSTEXT: Listener._on_text,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Listener._on_target,
     mavlink.MAVLINK_MSG_ID_WIND_COV: Listener._on_wind,
+    mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Listener._on_figure,
+    mavlink.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY: Listener._on_array,
 }

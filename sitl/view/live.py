@@ -9,6 +9,7 @@ from typing import Any
 from sitl.view.listener import Listener
 from sitl.view.panel import Panel
 from sitl.view.scene import Scene
+from sitl.view.steering import Steering
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.process import StopRequest
@@ -28,25 +29,34 @@ def watch(
     path: (n, 3) m, the reference's way; None: there is none.
     """
     home = vehicle.home
-    listener = Listener(LocalOrigin(home.latitude, home.longitude, home.altitude))
-    scene, panel = Scene(server, vehicle), Panel(server)
+    listener = Listener(LocalOrigin(home.latitude, home.longitude, home.altitude), vehicle.node_count)
+    scene, steering, panel = Scene(server, vehicle), Steering(server.gui), Panel(server)
     if path is not None:
         scene.show_path(path)
     links: list[Link] = []
     try:
         for address in addresses:
             links.append(open_link(address, lambda text: None))
-        _loop(links, listener, scene, panel, stop)
+        _loop(links, listener, scene, panel, steering, stop)
     finally:
         for link in links:
             link.close()
 
 
-def _loop(links: list[Link], listener: Listener, scene: Scene, panel: Panel, stop: StopRequest) -> None:
+def _loop(
+    links: list[Link],
+    listener: Listener,
+    scene: Scene,
+    panel: Panel,
+    steering: Steering,
+    stop: StopRequest,
+) -> None:
     next_picture = time.monotonic()
     shown = None
     while stop.reason is None:
         now = time.monotonic()
+        for setting in steering.asked():
+            listener.set_plant(*setting)
         for datagram in listener.to_send(now):
             for link in links:
                 link.send(datagram)
@@ -61,6 +71,7 @@ def _loop(links: list[Link], listener: Listener, scene: Scene, panel: Panel, sto
                 shown = listener.view
                 scene.show(shown)
             panel.show(listener.view, now)
+            steering.show(listener.view)
 
 
 def _drain(link: Link, listener: Listener, until: float) -> None:

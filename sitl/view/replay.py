@@ -24,7 +24,7 @@ def views_of_recording(recording: Recording, rate_hz: float = FRAME_RATE_HZ) -> 
     rows = np.searchsorted(halfway, wanted)  # the nearest
     vehicle, load = recording.vectors("vehicle_{}_m"), recording.vectors("load_{}_m")
     attitude, controls = recording.vectors("attitude_q{}", "wxyz"), recording.controls()
-    tension = states["cable_tension_N"]
+    tension, nodes = states["cable_tension_N"], recording.nodes()
     return [
         View(
             time_s=float(times[row]),
@@ -34,6 +34,7 @@ def views_of_recording(recording: Recording, rate_hz: float = FRAME_RATE_HZ) -> 
             set_point=_triple(recording.reference[row]),
             rotors=tuple(controls[row].tolist()),
             tension=float(tension[row]),
+            nodes=tuple(map(_triple, nodes[row])),
         )
         for row in rows.tolist()
     ]

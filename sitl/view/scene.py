@@ -68,12 +68,18 @@ class Scene:
         """Draw the reference's way: points (n, 3), m, world."""
         self._draw_line("/path", points, _SET_POINT, 1.0)
 
-    def _draw_line(self, name: str, points: NDArray[np.float64], colour: Colour, thickness: float) -> None:
-        """A line through points (n, 3), m; an older one of that name is changed."""
+    def _draw_line(
+        self, name: str, points: NDArray[np.float64], colour: Colour | list[Colour], thickness: float
+    ) -> None:
+        """A line through points (n, 3), m; an older one of that name is changed.
+
+        colour: of the line, or of each of its n - 1 pieces.
+        """
         if len(points) < 2:
             return
         segments = np.stack((points[:-1], points[1:]), axis=1).astype(np.float32)
-        colours = np.broadcast_to(np.array(colour, np.uint8), segments.shape)
+        pieces = np.array(colour, np.uint8).reshape(-1, 1, 3)
+        colours = np.broadcast_to(pieces, segments.shape)
         line = self._lines.get(name)
         if line is None:
             self._lines[name] = self._scene.add_line_segments(
@@ -137,24 +143,17 @@ class Scene:
             blade.wxyz = _about_z(float(self._angles[index]))
 
     def _show_cable(self, view: View) -> None:
+        """A line from vehicle to load, through a chain's nodes; none once it joins them no more."""
         if view.vehicle is None or view.load is None:
             return
-        self._draw_line("/cable", np.array([view.vehicle, view.load]), self._cable_colour(view), 3.0)
-
-    def _cable_colour(self, view: View) -> Colour:
-        """Grey while slack, green up to the load's weight, red at twice that."""
-        tension = view.tension
-        if tension is None:
-            tension = max(0.0, self._spring_force(view.cable_length or 0.0))
-        if tension <= 0.0:
-            return _SLACK
-        excess = tension / (self._vehicle.load.mass * self._vehicle.gravity) - 1.0
-        red, green, blue = colorsys.hsv_to_rgb((1.0 - min(1.0, max(0.0, excess))) / 3.0, 0.85, 0.8)
-        return (round(255 * red), round(255 * green), round(255 * blue))
-
-    def _spring_force(self, length: float) -> float:
-        cable = linear_cable(self._vehicle)
-        return cable.stiffness * (length - cable.rest_length)
+        broken = view.tension is not None and math.isnan(view.tension)
+        if "/cable" in self._lines:
+            self._lines["/cable"].visible = not broken
+        if broken:
+            return
+        points = np.array([view.vehicle, *view.nodes, view.load])
+        colours = [_colour(share) for share in load_shares(self._vehicle, view.tension, points)]
+        self._draw_line("/cable", points, colours, 3.0)
 
     def _trail(self, body: str, at: Triple) -> None:
         points = self._trails[body]
@@ -166,6 +165,31 @@ class Scene:
     def _show_wind(self, at: Triple, wind: Triple) -> None:
         head = tuple(a + 0.2 * w for a, w in zip(at, wind, strict=True))
         self._scene.add_arrows("/wind", np.array([[at, head]]), (80, 160, 200))
+
+
+def load_shares(vehicle: Vehicle, tension: float | None, points: NDArray[np.float64]) -> list[float]:
+    """Tension over the load's weight in each piece of a cable through points (n, 3), m.
+
+    A chain's tension is told at its top. The other pieces differ from the topmost in length by what their
+    springs pull more or less. Where no tension is told, the springs pull as described.
+    """
+    cable, pieces = linear_cable(vehicle), len(points) - 1
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if tension is not None and (pieces == 1 or tension > 0.0):
+        tensions = tension + cable.stiffness * pieces * (lengths - lengths[0])
+    else:
+        tensions = cable.stiffness * (pieces * lengths - cable.rest_length)
+    tensions = np.maximum(0.0, tensions)
+    shares: list[float] = (tensions / (vehicle.load.mass * vehicle.gravity)).tolist()
+    return shares
+
+
+def _colour(share: float) -> Colour:
+    """Grey while slack, green up to the load's weight, red at twice that."""
+    if share <= 0.0:
+        return _SLACK
+    red, green, blue = colorsys.hsv_to_rgb((1.0 - min(1.0, max(0.0, share - 1.0))) / 3.0, 0.85, 0.8)
+    return (round(255 * red), round(255 * green), round(255 * blue))
 
 
 def _about_z(angle: float) -> Quaternion:

@@ -15,6 +15,7 @@ class View:
     """What is known; None where nothing has said it."""
 
     time_s: float = 0.0
+    """Since the scenario began, where that is known, else since the first message."""
     vehicle: Triple | None = None
     """m."""
     attitude: Quaternion = UPRIGHT
@@ -30,9 +31,15 @@ class View:
     battery: float | None = None
     """Charge left, 0 to 1."""
     tension: float | None = None
-    """N, of the cable."""
+    """N, of the cable; NaN once it has broken or let go."""
+    nodes: tuple[Triple, ...] = ()
+    """m, of a cable that is a chain, from the vehicle to the load."""
     wind: Triple | None = None
     """m/s."""
+    speed: float | None = None
+    """Simulated seconds a second that the plant is asked for; 0: paused, below 0: as fast as it goes."""
+    steerable: bool = False
+    """Whether the speed can be changed."""
     texts: tuple[str, ...] = ()
     """The latest STATUSTEXTs, newest last."""
 

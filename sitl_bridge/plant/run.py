@@ -26,10 +26,13 @@ from sitl_bridge.plant.physics.state import LOAD_POSITION
 from sitl_bridge.plant.sensing import Diverged
 from sitl_bridge.plant.simulation import NO_FAULTS, Simulation
 from sitl_bridge.plant.wire.load_to import LoadTo
+from sitl_bridge.plant.wire.speed import SpeedService
 from sitl_bridge.plant.wire.truth_to import TruthTo
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 
+MOST_HEARD = 10
+"""Datagrams of a viewer that are taken in before the flight goes on."""
 REPORT_INTERVAL = 0.2
 """Between two progress events, s."""
 
@@ -143,8 +146,9 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
     try:
         if options.load_to is not None:
             audience.append(Listener(options.load_to, LoadTo(options.instance, simulation.origin)))
+        speed = SpeedService(options.instance, clock, speaker.say)
         for address in options.truth_to:
-            audience.append(Listener(address, TruthTo(options.instance, simulation.origin)))
+            audience.append(Listener(address, TruthTo(options.instance, simulation.origin), speed))
         _loop(clock, link, tlog, progress, audience, stop)
     except Diverged as error:
         failure = str(error)
@@ -166,17 +170,32 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
 
 
 class Listener:
-    """A ground station or a viewer that is only told, at the pace of the wall clock."""
+    """A ground station or a viewer that is told of the flight, at the pace of the wall clock.
 
-    def __init__(self, address: tuple[str, int], source: LoadTo | TruthTo) -> None:
+    speed: what answers it; None: nothing that it says is listened to.
+    """
+
+    def __init__(
+        self, address: tuple[str, int], source: LoadTo | TruthTo, speed: SpeedService | None = None
+    ) -> None:
         self._link = open_link(Address("udpout", *address), lambda text: None)
         self._source = source
+        self._speed = speed
 
     def show(self, now: float, simulation: Simulation) -> None:
-        """Send what is due."""
-        datagram = self._source.to_send(now, simulation.time_usec, simulation.world)
-        if datagram is not None:
-            self._link.send(datagram)
+        """Send what is due, and then take in what the listener says."""
+        datagram = self._source.to_send(now, simulation)
+        if datagram is None:
+            return
+        self._link.send(datagram)
+        if self._speed is None:
+            return
+        for _ in range(MOST_HEARD):
+            said = self._link.receive(now)
+            if said is None:
+                return
+            if reply := self._speed.receive(said, now):
+                self._link.send(reply)
 
     def close(self) -> None:
         """Free the port."""

@@ -18,6 +18,7 @@ from sitl_bridge.plant.faults.due import DueFaults
 from sitl_bridge.plant.faults.schedule import Action, Faults, from_command, lightest_load, with_gusts
 from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
 from sitl_bridge.plant.lost_vehicle import GRACE, LOOK_INTERVAL, is_lost
+from sitl_bridge.plant.physics.battery import BatteryReading
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.sensing import Diverged, Sensing
@@ -162,6 +163,11 @@ class Simulation:
     def scenario_time(self) -> float:
         """Seconds since the scenario began."""
         return self.ticks_flown / self.rate_hz
+
+    @property
+    def power(self) -> BatteryReading | None:
+        """What the battery's power module told last; None: there is no battery."""
+        return self._power
 
     def datagram(self) -> bytes:
         """The current tick's frames; the same bytes as often as it is asked for.

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.link.packing import frame
 from controller.pilot.ground_piloted import WEIGHTS
 from sitl_bridge.mavlink.framing import Frame, split
-from tests.ground.flown import Flown
+from tests.ground.flown import RATE_HZ, Flown
 from tests.ground.rig import NAN, Client
 from tests.loopback import swing
 
@@ -202,3 +202,21 @@ def test_it_flies_on_when_the_cable_snaps() -> None:
     assert client.command(21).result == 0
     flight.run_until(lambda: not flight.station.armed)
     assert flight.flown(0.1).vehicle[-1, 2] < 0.15
+
+
+def test_a_plant_that_is_paused_for_a_minute_is_not_lost() -> None:
+    rig = Flown()
+    client = rig.client()
+    rig.take_off(client)
+    rig.run(1.0)
+    mode, ticks = rig.station.machine.mode, rig.simulation.ticks_flown
+    rig.clock.change_speed(0.0, rig.now)
+    for _ in range(round(60.0 * RATE_HZ)):
+        rig.tick()
+        rig.pilot.wait(rig.now)
+    assert rig.simulation.ticks_flown <= ticks + 1
+    rig.clock.change_speed(None, rig.now)
+    rig.run(1.0)
+    assert rig.simulation.ticks_flown >= ticks + RATE_HZ
+    assert (rig.station.machine.mode, rig.station.armed) == (mode, True)
+    assert not [text for text in client.texts() if "lost" in text]

@@ -13,29 +13,38 @@ change how long a run takes and never what happens in it.
               | the answer to this tick             | the autopilot is there;       | READY
               |                                     | the tick is over              |
     READY     | the tick is due                     | send it                       | WAITING
+              | it is not due for a long time       | say HEARTBEAT                 | READY
     WAITING   | the answer to this tick             | the tick is over              | READY
               | time-out                            | send it again                 | WAITING
               | time-out after the last repeat, and | fly it with the last controls,| WAITING
               | `on_silence` is "continue"          | send the next                 |
 
 A tick that is over has been flown under the answer's controls, or held before the scenario began. The first
-armed answer begins the scenario. Any other answer is a duplicate or late, and is dropped.
+armed answer begins the scenario. Any other answer is a duplicate or late, and is dropped. At speed 0 time
+stands still between two ticks, and the HEARTBEATs tell the autopilot that the plant is there.
 """
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from typing import Literal
 
+from sitl_bridge.ids import COMPONENT_TRUTH, vehicle_system
+from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.plant.clocks.receiver import HilReceiver
 from sitl_bridge.plant.clocks.retransmission import RetransmissionTimer
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.wire.slow_frames import plant_heartbeat
 
 REPEATS_BEFORE_NOTICE = 3
 SILENCE_BEFORE_NOTICE = 1.0
 """And at least so long without an answer before anything is said, s."""
+
+KEEP_ALIVE = 0.25
+"""Between two HEARTBEATs while no tick is due, s: an autopilot takes longer silence for lost sensors."""
 
 OnSilence = Literal["wait", "continue"]
 
@@ -66,8 +75,12 @@ class Lockstep:
         self.unanswered_ticks = 0
         """Ticks flown with the last controls because no answer came."""
         self._receiver = HilReceiver(simulation, notices, instance)
+        self._packer = Packer(vehicle_system(instance), COMPONENT_TRUTH)
         self._notices = notices
-        self._pace = None if speed is None else simulation.period / speed
+        self.speed = speed
+        """Simulated seconds a second at the most; 0: time stands still; None: as fast as it goes."""
+        self._pace = self._interval(speed)
+        self._steps = 0  # ticks that may be flown at speed 0
         self._resend = resend
         self._on_silence = on_silence
         self._state = State.START
@@ -88,6 +101,27 @@ class Lockstep:
         """Begin to freewheel."""
         self._due = self._not_before = now
 
+    def change_speed(self, speed: float | None, now: float) -> None:
+        """From the end of the current tick on; 0: time stands still; None: as fast as it goes."""
+        self.speed, self._pace, self._steps = speed, self._interval(speed), 0
+        self._not_before = math.inf if speed == 0.0 else now
+        if self._state is State.READY:
+            self._wait_for_time(now)
+
+    def step(self, ticks: int, now: float) -> None:
+        """Let a world that stands still go on for so many ticks."""
+        if self.speed != 0.0 or ticks <= 0:
+            return
+        self._steps = ticks
+        if self._state is State.READY:
+            self._steps -= 1
+            self._not_before = self._due = now
+
+    @property
+    def steps_left(self) -> int:
+        """Ticks that a world at speed 0 has still to go on for."""
+        return self._steps
+
     def next_deadline(self) -> float:
         """When `to_send` has something to do at the latest."""
         return self._due
@@ -103,6 +137,9 @@ class Lockstep:
             self._freewheel(now)
         elif self._state is State.WAITING:
             self._repeat(now)
+        elif now < self._not_before:
+            self._wait_for_time(now)
+            return [*out, self._packer.pack(plant_heartbeat())]
         if self.simulation.finished:
             return out
         self._sent_at = now
@@ -181,6 +218,19 @@ class Lockstep:
             self._timer.sample(now - self._sent_at)
         self._state, self._repeats = State.READY, 0
         self._due = now
-        if self._pace is not None:
-            self._not_before = max(self._not_before + self._pace, now - self._pace)
-            self._due = max(self._not_before, now)
+        if self._pace is None:
+            return
+        if self._steps > 0:
+            self._steps -= 1
+            return
+        self._not_before = max(self._not_before + self._pace, now - self._pace)
+        self._wait_for_time(now)
+
+    def _wait_for_time(self, now: float) -> None:
+        self._due = max(now, min(self._not_before, now + KEEP_ALIVE))
+
+    def _interval(self, speed: float | None) -> float | None:
+        """Between two ticks, s; None: none."""
+        if speed is None:
+            return None
+        return self.simulation.period / speed if speed > 0.0 else math.inf

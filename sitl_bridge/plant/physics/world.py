@@ -18,6 +18,7 @@ from sitl_bridge.plant.physics.battery import (
     reading,
 )
 from sitl_bridge.plant.physics.cable import tension_of
+from sitl_bridge.plant.physics.chain import NODE_STATES
 from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.physics.dynamics import advance, set_rotors
 from sitl_bridge.plant.physics.hoist import Reel, hoist
@@ -25,6 +26,7 @@ from sitl_bridge.plant.physics.parameters import parameters, step_count
 from sitl_bridge.plant.physics.record import WORLD
 from sitl_bridge.plant.physics.state import (
     CABLE_HOLDS,
+    CABLE_STATE,
     MOST_ROTORS,
     STOPPED,
     Array,
@@ -202,6 +204,15 @@ class World:
     def cable_tension(self) -> float:
         """The cable's tension, N."""
         return tension_of(self._parameters.view(np.recarray)[0], self.state, self.inner)
+
+    def chain_nodes(self) -> Array:
+        """Where the nodes of a chain are, (n, 3), m, from the top; other cables have none."""
+        count = self.vehicle.node_count
+        return self.inner[CABLE_STATE : CABLE_STATE + NODE_STATES * count].reshape(count, NODE_STATES)[:, :3]
+
+    def wind(self) -> Array:
+        """At the vehicle, m/s, world ENU."""
+        return self._wind.now[:3]
 
     def reel(self) -> Reel:
         """The winch as it is now."""

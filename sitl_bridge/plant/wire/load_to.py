@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_TRUTH, load_system, vehicle_system
 from sitl_bridge.mavlink.framing import Packer
@@ -13,6 +15,9 @@ from sitl_bridge.plant.wire.slow_frames import (
     landing_target,
     load_heartbeat,
 )
+
+if TYPE_CHECKING:
+    from sitl_bridge.plant.simulation import Simulation
 
 POSITION_INTERVAL = 0.1
 """s, by the wall clock: as ArduPilot's slung-load script has it."""
@@ -35,8 +40,9 @@ class LoadTo:
         self._count = 0
         self._seen = 0
 
-    def to_send(self, now: float, time_usec: int, world: World) -> bytes | None:
+    def to_send(self, now: float, simulation: Simulation) -> bytes | None:
         """What is due."""
+        time_usec, world = simulation.time_usec, simulation.world
         out = self._sighting(time_usec, world)
         if now >= self._next:
             self._next = now + POSITION_INTERVAL

@@ -41,12 +41,21 @@ WINCH_INTERVAL = 0.05
 
 def load_heartbeat() -> Any:
     """HEARTBEAT of a body without autopilot, modes and arming."""
+    return _heartbeat(common.MAV_TYPE_AIRSHIP, common.MAV_STATE_ACTIVE)
+
+
+def plant_heartbeat() -> Any:
+    """HEARTBEAT of a plant whose time stands still: it is there."""
+    return _heartbeat(common.MAV_TYPE_ONBOARD_CONTROLLER, common.MAV_STATE_STANDBY)
+
+
+def _heartbeat(kind: int, status: int) -> Any:
     return common.MAVLink_heartbeat_message(
-        type=common.MAV_TYPE_AIRSHIP,
+        type=kind,
         autopilot=common.MAV_AUTOPILOT_INVALID,
         base_mode=0,
         custom_mode=0,
-        system_status=common.MAV_STATE_ACTIVE,
+        system_status=status,
         mavlink_version=3,
     )
 

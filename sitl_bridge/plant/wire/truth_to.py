@@ -1,12 +1,12 @@
 """`--truth-to`: the true state of vehicle and load for a viewer, at the pace of the wall clock. No I/O.
 
 For each body HIL_STATE_QUATERNION, which PX4's viewers draw, and ODOMETRY, which is finer. Rotor speeds as
-HIL_ACTUATOR_CONTROLS. The vehicle is system N+1, the load a system of its own.
+HIL_ACTUATOR_CONTROLS, and what `figures` says. The vehicle is system N+1, the load a system of its own.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pymavlink.dialects.v20 import common
 
@@ -38,12 +38,18 @@ from sitl_bridge.plant.physics.state import (
     Array,
 )
 from sitl_bridge.plant.physics.world import World
+from sitl_bridge.plant.wire.figures import moving, weather
 from sitl_bridge.plant.wire.slow_frames import load_heartbeat
+
+if TYPE_CHECKING:
+    from sitl_bridge.plant.simulation import Simulation
 
 INTERVAL = 1.0 / 125.0
 """s between two datagrams: a companion flies on them."""
 HEARTBEAT_EVERY = 125
-"""Datagrams."""
+"""Datagrams, likewise the next two."""
+FIGURES_EVERY = 3
+WEATHER_EVERY = 25
 _LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 _NAN21 = [float("nan")] + [0.0] * 20
 """A covariance that is not known."""
@@ -59,11 +65,12 @@ class TruthTo:
         self._next = 0.0
         self._count = 0
 
-    def to_send(self, now: float, time_usec: int, world: World) -> bytes | None:
+    def to_send(self, now: float, simulation: Simulation) -> bytes | None:
         """What is due at `now`, s."""
         if now < self._next:
             return None
         self._next = now + INTERVAL
+        time_usec, world = simulation.time_usec, simulation.world
         x = world.state
         vehicle = _Pose(x[VEHICLE_POSITION], x[VEHICLE_VELOCITY], x[ATTITUDE], x[BODY_RATES])
         load = _Pose(x[LOAD_POSITION], x[LOAD_VELOCITY])
@@ -75,6 +82,10 @@ class TruthTo:
         out += self._load.pack(_odometry(time_usec, load, FRAME_LOCAL_NED))
         if self._count % HEARTBEAT_EVERY == 0:
             out += self._load.pack(load_heartbeat())
+        if self._count % FIGURES_EVERY == 0:
+            out += b"".join(self._vehicle.pack(message) for message in moving(simulation))
+        if self._count % WEATHER_EVERY == 0:
+            out += b"".join(self._vehicle.pack(message) for message in weather(simulation))
         self._count += 1
         return out
 

@@ -29,7 +29,8 @@ class Flight:
         vehicle = paper()
         self.simulation, self.rows = simulation(vehicle, duration)
         self.clock = Lockstep(self.simulation, Notices(self.said.append), 0, **options)  # type: ignore[arg-type]
-        self.session = autopilot_session(vehicle)
+        self.autopilot_said: list[str] = []
+        self.session = autopilot_session(vehicle, say=self.autopilot_said.append)
         self.network = Network(self.clock, self.session, faults)
         self.clock.start(self.network.now)
 

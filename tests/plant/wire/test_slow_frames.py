@@ -189,7 +189,7 @@ def test_load_to_shows_the_load_to_maps_of_both_kinds() -> None:
     state[16:19] = (1.0, 0.0, 0.5)
     counts = {"HEARTBEAT": 0, "GLOBAL_POSITION_INT": 0, "ADSB_VEHICLE": 0}
     for k in range(1000):  # ten seconds of wall time, simulated time standing still
-        datagram = load.to_send(100.0 + 0.01 * k, 4000, simulation.world)
+        datagram = load.to_send(100.0 + 0.01 * k, simulation)
         for frame in split(datagram or b"").frames:
             message = decode(frame)
             counts[message.get_type()] += 1
@@ -214,7 +214,8 @@ def test_load_to_shows_each_sighting_of_a_tracker_once() -> None:
     seen = []
     for tick in range(1, round(RATE) + 1):
         tracker.sample(tick, simulation.world.state)
-        datagram = load.to_send(100.0 + tick / RATE, 4000 * tick, simulation.world)
+        simulation.time_usec = 4000 * tick
+        datagram = load.to_send(100.0 + tick / RATE, simulation)
         messages = [decode(frame) for frame in split(datagram or b"").frames]
         seen += [m for m in messages if m.get_type() == "LANDING_TARGET"]
     assert len(seen) == 20

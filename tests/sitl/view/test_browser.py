@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +84,51 @@ def test_a_finished_flight_is_played_and_paused(flight: Path, page: Page) -> Non
         finally:
             view.stdin.close()
             assert view.wait(30) == 0
+
+
+def shown_time(page: Page) -> str:
+    return str(page.get_by_role("cell", name="time").locator("xpath=following-sibling::td").inner_text())
+
+
+def until_time_is(page: Page, wanted: Callable[[float], bool]) -> None:
+    """Until the time that is shown (s) is one that is wanted."""
+    for _ in range(240):
+        if wanted(float(shown_time(page).split()[0])):
+            return
+        page.wait_for_timeout(250)
+    raise AssertionError(f"the time shown is {shown_time(page)}")
+
+
+def until_said(page: Page, said: Path, pattern: str) -> str:
+    for _ in range(240):
+        if found := re.search(pattern, said.read_text()):
+            return found[1]
+        page.wait_for_timeout(250)
+    raise AssertionError(f"{pattern} was not said: {said.read_text()}")
+
+
+def test_a_flight_is_paused_goes_on_by_a_step_and_then_by_itself(tmp_path: Path, page: Page) -> None:
+    command = [sys.executable, "-m", "sitl", "fly", "setpoint", "--instance", "60", "--clock", "lockstep"]
+    command += ["--speed", "1", "--duration", "10000", "--view", "--out", str(tmp_path / "flight")]
+    said = tmp_path / "said"
+    with said.open("w") as file, subprocess.Popen(command, stderr=file, cwd=tmp_path) as flight:
+        try:
+            page.goto(until_said(page, said, r"view: (\S+)\n"))
+            page.get_by_role("button", name="Pause").click()
+            paused = float(until_said(page, said, r"paused at t = (\S+) s"))
+            until_time_is(page, lambda shown: shown == pytest.approx(paused, abs=0.06))
+            page.get_by_label("Ticks a step").click()
+            page.get_by_role("option", name="125", exact=True).click()
+            page.get_by_role("button", name="Step").click()
+            until_time_is(page, lambda shown: shown == pytest.approx(paused + 0.5, abs=0.06))
+            page.wait_for_timeout(1500)  # nobody is taken for lost
+            page.get_by_role("button", name="Go on").click()
+            assert float(until_said(page, said, r"goes on at t = (\S+) s")) == pytest.approx(paused + 0.5)
+            until_time_is(page, lambda shown: shown > paused + 0.7)
+        finally:
+            flight.send_signal(signal.SIGINT)
+            flight.wait(60)
+    assert "waiting for the plant" not in said.read_text()
 
 
 def test_an_exported_page_needs_no_server(flight: Path, page: Page) -> None:

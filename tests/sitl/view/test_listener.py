@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -25,7 +26,7 @@ def test_it_shows_what_the_plant_says_of_its_truth() -> None:
     vehicle = load_vehicle("iris", ["initial.start=hover", "initial.attitude=[0.1,-0.2,2.5]"])
     simulation = Simulation(vehicle, 250.0, seed=0)
     world = simulation.world
-    datagram = TruthTo(0, simulation.origin).to_send(0.0, 4000, world)
+    datagram = TruthTo(0, simulation.origin).to_send(0.0, simulation)
     assert datagram is not None
     listener = Listener()
     listener.receive(datagram, 0.0)
@@ -41,7 +42,7 @@ def test_it_shows_what_the_plant_says_of_its_truth() -> None:
 def test_hil_state_quaternion_alone_gives_the_place_within_its_resolution() -> None:
     vehicle = load_vehicle("iris", ["initial.start=hover", "initial.load_position=[30,-20,10]"])
     simulation = Simulation(vehicle, 250.0, seed=0)
-    datagram = TruthTo(0, simulation.origin).to_send(0.0, 4000, simulation.world)
+    datagram = TruthTo(0, simulation.origin).to_send(0.0, simulation)
     listener = Listener(simulation.origin)
     for frame in split(datagram or b"").frames:
         if frame.message_id == mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION:
@@ -90,7 +91,10 @@ def test_the_loads_place_is_the_loads() -> None:
     assert listener.view.load[2] == pytest.approx(5.0)
 
 
-@given(st.binary(max_size=300), st.sampled_from([0, 30, 31, 32, 33, 85, 93, 115, 147, 231, 253, 331]))
+@given(
+    st.binary(max_size=300),
+    st.sampled_from([0, 22, 30, 31, 32, 33, 85, 93, 115, 147, 231, 251, 253, 331, 350]),
+)
 def test_no_payload_upsets_it(payload: bytes, message_id: int) -> None:
     from sitl_bridge.mavlink.framing import Frame
 
@@ -98,3 +102,42 @@ def test_no_payload_upsets_it(payload: bytes, message_id: int) -> None:
     listener.take(Frame(message_id, 1, 1, payload[:255], b"\xfd"), 0.0)
     listener.receive(payload, 0.0)
     assert listener.view.vehicle is None or all(map(math.isfinite, listener.view.vehicle))
+
+
+def test_it_shows_a_chains_nodes_tension_and_the_scenarios_time() -> None:
+    settings = ["cable.model=chain", "cable.segments=5", "air.wind=[3,1,0]", "initial.start=hover"]
+    simulation = Simulation(load_vehicle("iris", settings), 250.0, seed=0)
+    for _ in range(10):
+        simulation.next_tick()
+    simulation.begin()
+    for _ in range(100):
+        simulation.step(np.zeros(16))
+    datagram = TruthTo(0, simulation.origin).to_send(0.0, simulation)
+    listener = Listener(simulation.origin, node_count=4)
+    listener.receive(datagram or b"", 0.0)
+    view = listener.view
+    assert np.array(view.nodes) == pytest.approx(simulation.world.chain_nodes(), abs=1e-5)
+    assert view.tension == pytest.approx(simulation.world.cable_tension(), rel=1e-5)
+    assert view.time_s == pytest.approx(0.4, abs=1e-3)
+    assert view.wind == pytest.approx((3.0, 1.0, 0.0))
+    simulation.world.release_cable()
+    broken = TruthTo(0, simulation.origin).to_send(0.0, simulation)
+    listener.receive(broken or b"", 0.1)
+    assert math.isnan(listener.view.tension or 0.0)
+
+
+def test_it_sets_the_plants_speed_once_the_plant_can_be_steered() -> None:
+    listener = Listener()
+    simulation = Simulation(load_vehicle("iris", []), 250.0, seed=0)
+    listener.receive(TruthTo(0, simulation.origin).to_send(0.0, simulation) or b"", 0.0)
+    listener.set_plant("SIM_SPEEDUP", 0.0)
+    sent = [decode(frame) for data in listener.to_send(0.0) for frame in split(data).frames]
+    assert [m.get_type() for m in sent] == ["HEARTBEAT", "PARAM_REQUEST_LIST"]
+    for name, value in ((b"SIM_SPEEDUP", 0.5), (b"SIM_STEPS", 0.0)):
+        message = mavlink.MAVLink_param_value_message(name, value, 9, 2, 0)
+        listener.receive(Packer(1, 191).pack(message), 0.1)
+    assert (listener.view.speed, listener.view.steerable) == (0.5, True)
+    listener.set_plant("SIM_SPEEDUP", 0.0)
+    [sent_now] = [decode(frame) for data in listener.to_send(0.2) for frame in split(data).frames]
+    assert (sent_now.param_id, sent_now.param_value) == ("SIM_SPEEDUP", 0.0)
+    assert (sent_now.target_system, sent_now.target_component) == (1, 191)

@@ -7,12 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sitl.recording.recording import RecordingError, read_recording
 from sitl.view.panel import aim, numbers
 from sitl.view.replay import views_of_recording, views_of_tlog
+from sitl.view.scene import load_shares
 from sitl.view.view import View
+from sitl_bridge.vehicle.files import load_vehicle
 from tests.sitl.export.flights import leave_flight
 
 
@@ -69,3 +72,15 @@ def test_a_camera_looks_at_what_flies_from_elsewhere(camera: str) -> None:
     position, target = aimed
     assert math.dist(position, target) > 0.1
     assert aim("free", view, 5.0) is None
+
+
+def test_each_piece_of_a_chain_pulls_as_its_spring_does() -> None:
+    vehicle = load_vehicle("iris", ["cable.model=chain", "cable.segments=2"])
+    cable, weight = vehicle.cable, vehicle.load.mass * vehicle.gravity
+    half = 0.5 * cable.rest_length
+    pulled = 2.0 * cable.stiffness * 0.01
+    points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -half - 0.01], [0.0, 0.0, -2.0 * half - 0.01]])
+    assert load_shares(vehicle, None, points) == pytest.approx([pulled / weight, 0.0], abs=1e-9)
+    told = load_shares(vehicle, pulled + 3.0, points)
+    assert told == pytest.approx([(pulled + 3.0) / weight, 3.0 / weight])
+    assert load_shares(vehicle, 7.0, points[[0, 2]]) == pytest.approx([7.0 / weight])
