@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import common
 from controller.design.catalogue import EVEN, Emphasis, guided_designs
 from controller.feedback.assessment import Assessor, Contact, ExactAssessor
 from controller.ground.commands.result import INFO, WARNING, Notice
+from controller.ground.flight.payload.winch import Report
 from controller.ground.flight.setpoint_types import (
     Attitude,
     Body,
@@ -119,7 +120,7 @@ class GuidedAutopilot:
         self._designed_length = self._wanted_length = vehicle.cable.rest_length
         """m, of the cable that the gains are for, or will be"""
         self._designing = self._new_weights = False
-        gripper = station.machine.gripper
+        gripper = station.machine.payload.gripper
         if gripper is not None:
             gripper.feels_hook = self._assessor.feels_hook
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
@@ -166,21 +167,18 @@ class GuidedAutopilot:
             self.station.machine.disarm(force=True)
         self._law = None
         self._view = None
-        if self.station.machine.gripper is not None:
-            self.station.machine.gripper.restart()
-        if self.station.machine.winch is not None:
-            self.station.machine.winch.restart()
+        self.station.machine.payload.restart()
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, and the battery is measured."""
         self.station.hear_plant(frame, now)
         if is_plant_heartbeat(frame):  # its time stands still: nothing is lost
             self._heard = now
-        winch = self.station.machine.winch
+        winch = self.station.machine.payload.winch
         if frame.message_id == common.MAVLINK_MSG_ID_WINCH_STATUS and winch is not None:
             status = decoded(frame)
-            if status is not None and math.isfinite(status.line_length + status.speed):
-                winch.heard(status.line_length, status.speed)
+            if status is not None:
+                winch.heard(Report(status.line_length, status.speed, status.tension, status.status))
         if frame.message_id == common.MAVLINK_MSG_ID_BATTERY_STATUS and self._view is not None:
             battery = decoded(frame)
             if battery is None:
@@ -207,12 +205,12 @@ class GuidedAutopilot:
         self._take_designs()
         self._follow_winch()
         self._fly(target, estimate, view, contact)
-        machine = self.station.machine
-        if machine.gripper is not None:
-            self._controls[self._gripper_control] = machine.gripper.output
-        if machine.winch is not None:
-            self._controls[self._winch_control] = machine.winch.output
-            self._controls[self._clutch_control] = machine.winch.clutch
+        payload = self.station.machine.payload
+        if payload.gripper is not None:
+            self._controls[self._gripper_control] = payload.gripper.output
+        if payload.winch is not None:
+            self._controls[self._winch_control] = payload.winch.output
+            self._controls[self._clutch_control] = payload.winch.clutch
 
     def _seen(self, estimate: Array, time_usec: int, now: float) -> tuple[VehicleView, Contact, bool]:
         """The view of an estimate, what touches what in it, and whether it is the first."""
@@ -250,7 +248,7 @@ class GuidedAutopilot:
         Seen from a load that sinks at the winch's rate the vehicle sinks with it, as on a cable of constant
         length.
         """
-        winch = self.station.machine.winch
+        winch = self.station.machine.payload.winch
         if winch is None:
             return
         change = winch.length - self.station.profile.rest_length
@@ -274,7 +272,7 @@ class GuidedAutopilot:
 
     def _work_gripper(self, view: VehicleView, contact: Contact, now: float) -> None:
         """Fly without the load once the gripper has let it go, and with it once it has taken it."""
-        gripper = self.station.machine.gripper
+        gripper = self.station.machine.payload.gripper
         if gripper is None:
             return
         self._assessor.hook(self.armed and gripper.output > 0.0)
@@ -350,7 +348,11 @@ class GuidedAutopilot:
         yaw = float(estimate[EULER_ANGLES][2] if self._law is None else self._trajectory.path["yaw"][0])
         memory = engaged_memory(estimate[position])
         before = self._memory if self._law is not None else None
-        self._trajectory.start(estimate[position], estimate[velocity], yaw)
+        moves = estimate[velocity].copy()
+        winch = self.station.machine.payload.winch
+        if body is Body.LOAD and winch is not None:  # what the winch adds comes by `lower`
+            moves[2] += winch.speed
+        self._trajectory.start(estimate[position], moves, yaw)
         if before is not None and self._law is not None:
             handover.other_body(self._designs[self._law], self._designs[body], before, memory)
         if self._steered:

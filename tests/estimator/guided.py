@@ -17,7 +17,7 @@ from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
 from controller.law.state import Array
-from controller.pilot.ground_piloted import GuidedAutopilot
+from controller.pilot.ground_piloted import GuidedAutopilot, Redesigner
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices
@@ -43,9 +43,16 @@ class GuidedFlight:
     """One vehicle with its autopilot and station; `fly(until)` advances it."""
 
     def __init__(
-        self, vehicle: Vehicle, seed: int = 0, faults: dict[str, Any] | None = None, **parameters: float
+        self,
+        vehicle: Vehicle,
+        seed: int = 0,
+        faults: dict[str, Any] | None = None,
+        redesigner: Redesigner | None = None,
+        **parameters: float,
     ) -> None:
+        """redesigner: by default, gains stay as they are."""
         self.vehicle = vehicle
+        self._redesigner = redesigner or NoRedesign()
         table = validated(Faults, faults or {}, "faults")
         self.simulation = Simulation(vehicle, RATE_HZ, seed, faults=table)
         self.plant = Lockstep(self.simulation, Notices(lambda text: None), 0)
@@ -72,7 +79,7 @@ class GuidedFlight:
 
     def _autopilot(self, controls: Array) -> GuidedAutopilot:
         return GuidedAutopilot(
-            self.vehicle, RATE_HZ, self.station, NoRedesign(), controls, EstimateAssessor(self.feedback)
+            self.vehicle, RATE_HZ, self.station, self._redesigner, controls, EstimateAssessor(self.feedback)
         )
 
     @property

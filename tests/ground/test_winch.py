@@ -7,6 +7,7 @@ import pytest
 
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
+from tests.ground.flown import Designer
 from tests.ground.rig import NAN, Rig
 from tests.ground.test_gripper import ACCEPTED, DENIED, UNSUPPORTED, hovering
 
@@ -65,10 +66,11 @@ def test_relaxed_the_load_runs_out_until_it_lies() -> None:
 
 @pytest.mark.parametrize(("vehicle", "height", "preset"), [("iris", 9.0, "consumer"), ("heavy", 20.0, "rtk")])
 def test_on_estimates_the_filter_follows_the_cable(vehicle: str, height: float, preset: str) -> None:
-    flight = GuidedFlight(load_vehicle(vehicle, [f"sensors.preset={preset}"]), 1)
+    described = load_vehicle(vehicle, [f"sensors.preset={preset}"])
+    flight = GuidedFlight(described, 1, redesigner=Designer(described))
     flight.arm_and_take_off(height)
     flight.wait(3.0)
-    winch = flight.machine.winch
+    winch = flight.machine.payload.winch
     assert winch is not None
     for way in (2.0, -2.0):
         first, length = len(flight.rows), winch.length

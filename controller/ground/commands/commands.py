@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import OK, UNSUPPORTED, UNSUPPORTED_FRAME, Verdict, deny, not_now
 from controller.ground.flight.geometry import filled
-from controller.ground.flight.gripper import GRIPPER_ACTIONS, HOLD
 from controller.ground.flight.modes import Machine, Reposition
 from controller.ground.flight.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
+from controller.ground.flight.payload.gripper import GRIPPER_ACTIONS, HOLD
 from controller.ground.flight.px4_modes import Mode, find_mode, find_standard_mode
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple, yaw_from_heading
 
@@ -279,26 +279,11 @@ def _or(value: float, default: float) -> float:
 def _gripper(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     if c.p2 not in GRIPPER_ACTIONS:
         return deny(f"Gripper denied: action {c.p2:g}; use 0 (release), 1 (grab) or 2 (hold)")
-    return OK if c.p2 == HOLD and machine.gripper is not None else machine.grip(int(c.p2))
+    return OK if c.p2 == HOLD and machine.payload.gripper is not None else machine.grip(int(c.p2))
 
 
 def _winch(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
-    winch = machine.winch
-    if winch is None:
-        return Verdict(UNSUPPORTED, "Winch denied: this vehicle has none; see [winch] in its file")
-    if c.p2 == mavlink.WINCH_RELAXED:
-        winch.relax()
-    elif c.p2 == mavlink.WINCH_RELATIVE_LENGTH_CONTROL and math.isfinite(c.p3):
-        winch.go_by(c.p3, c.p4 if math.isfinite(c.p4) else 0.0)
-    elif c.p2 == mavlink.WINCH_RATE_CONTROL and math.isfinite(c.p4):
-        winch.turn(c.p4)
-    elif c.p2 in (mavlink.WINCH_LOCK, mavlink.WINCH_HOLD):
-        winch.turn(0.0)
-    elif c.p2 == mavlink.WINCH_RETRACT:
-        winch.go_by(-math.inf, 0.0)
-    else:
-        return deny(f"Winch denied: action {c.p2:g}; use 0 (relax), 1 (length), 2 (rate), 3, 5 or 6")
-    return OK
+    return machine.reel(c.p2, c.p3, c.p4)
 
 
 def _pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:

@@ -46,6 +46,8 @@ _LIFTING = 0.5
 """Share of the hover thrust below which a vehicle on the ground stays there"""
 _LONGEST_DRIVE = 0.2
 """s between two looks for which an acceleration drives on"""
+_NEAR = 1.0
+"""m, within which a vehicle hovers where it is to hover"""
 _STAY_AT_FLOOR = 0.3
 """m above the room that a stop needs, within which a body that stops at the floor goes on to"""
 
@@ -117,6 +119,8 @@ class Guidance:
         self.pattern: Pattern | None = None
         """An orbit in ORBIT, a figure of eight in HOLD"""
         self.followed = FollowTarget()
+        self._set_down = False
+        """The winch has lowered the load to the ground"""
         self._destination: tuple[Triple, float, float] | None = None
         """Of a reposition that waits for the end of a take-off: vehicle (m), yaw (rad), speed (m/s)"""
 
@@ -164,6 +168,7 @@ class Guidance:
         """Disarmed."""
         self.stage = Stage.GROUND
         self._ascent = self._descent = self._return = self._destination = self.pattern = None
+        self._set_down = False
         self.takeoff_height = math.nan
 
     # What is asked of it
@@ -263,7 +268,24 @@ class Guidance:
             return target
         if self.stage is Stage.DESCENT and self._descent is not None:
             return self._descend(self._descent, view, last)
+        self._note_set_down(view)
         return self._fly(view, setpoint, last)
+
+    def _note_set_down(self, view: VehicleView) -> None:
+        """A load that the winch lowers to the ground, or lifts from it: the vehicle holds where it hovers."""
+        lies = view.load_attached and view.load_on_ground
+        lifted = view.load_attached and view.cable_taut and not view.load_on_ground
+        if self._profile.winch is None or not (lifted if self._set_down else lies):
+            self._set_down = self._set_down and view.load_attached
+            return
+        self._set_down = lies
+        hanging = self._profile.hover_length
+        if lies and self._point_of is Body.LOAD:
+            vehicle = above(self._point, hanging)
+            steady = math.dist(vehicle, view.position) < _NEAR
+            self._stay_at(vehicle if steady else view.position, Body.VEHICLE)
+        elif not lies and self._point_of is Body.VEHICLE:
+            self._stay_at(below(self._point, hanging), Body.LOAD)
 
     def _after_ascent(self, ascent: Ascent, view: VehicleView) -> None:
         done, mode = ascent.step is Step.DONE, self._pilot.mode

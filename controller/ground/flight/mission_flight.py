@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.gripper import GRAB, PATIENCE, RELEASE, Gripper
+from controller.ground.flight.payload.gripper import GRAB, PATIENCE, RELEASE
+from controller.ground.flight.payload.payload import DELIVER, Payload
 from controller.ground.flight.region_of_interest import RegionOfInterest
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,
@@ -25,6 +26,7 @@ from controller.ground.missions.item_types import (
     SET_HOME,
     TAKEOFF,
     WAYPOINT,
+    WINCH,
     WITH_POSITION,
 )
 from controller.ground.missions.mission_plan import Item
@@ -67,9 +69,11 @@ class Waypoint(NamedTuple):
 class MissionFlight:
     """The plan's progress. It survives a pause, and starts again at the beginning when it was complete."""
 
-    def __init__(self, gripper: Gripper | None = None) -> None:
-        """gripper: that items work; None: they are passed over."""
-        self._gripper = gripper
+    def __init__(self, payload: Payload) -> None:
+        """payload: that items work; what of it there is not is passed over."""
+        self._payload = payload
+        self.refusals: list[str] = []
+        """Why items had no effect, not yet announced."""
         self.replace(())
 
     def replace(self, items: tuple[Item, ...]) -> None:
@@ -151,8 +155,9 @@ class MissionFlight:
             elif item.command in POINTING:
                 self.region.point_at(item, self.items, place)
                 self._next()
-            elif item.command == GRIPPER and self._gripper is not None:
-                if not self._grips(item, self._gripper, view.time):
+            elif item.command in (GRIPPER, WINCH):
+                done = self._grips if item.command == GRIPPER else self._reels
+                if not done(item, view):
                     return Waypoint(None, math.nan)
                 self._next()
             elif item.command not in (*WITH_POSITION, *DELAYS):
@@ -163,14 +168,29 @@ class MissionFlight:
                     return stay
         return Then.LOST
 
-    def _grips(self, item: Item, gripper: Gripper, time: float) -> bool:
+    def _grips(self, item: Item, view: VehicleView) -> bool:
         """Whether the gripper has done what an item says, or has been waited for long enough."""
-        if item.p2 not in (RELEASE, GRAB):
+        gripper = self._payload.gripper
+        if gripper is None or item.p2 not in (RELEASE, GRAB):
             return True
         if self._since is None:
-            self._since = time
+            self._since = view.time
             gripper.act(int(item.p2))
-        return gripper.done or time - self._since >= PATIENCE
+        return gripper.done or view.time - self._since >= PATIENCE
+
+    def _reels(self, item: Item, view: VehicleView) -> bool:
+        """Whether the winch has done what an item says: a length, a delivery; the rest is done at once."""
+        if self._payload.winch is None:
+            return True
+        if self._since is None:
+            self._since = view.time
+            placing = item.command == PAYLOAD_PLACE
+            action = DELIVER if placing else item.p2
+            verdict = self._payload.work_winch(action, item.p3, item.p4, view)
+            if not verdict.ok:
+                self.refusals.append(f"Mission item {self.current}: {verdict.text}")
+                return True
+        return not self._payload.reeling
 
     def _fly(
         self, item: Item, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
@@ -191,6 +211,8 @@ class MissionFlight:
         elif point is None:
             self._arrived = True
         if self._arrived:
+            if item.command == PAYLOAD_PLACE and self._payload.delivers:
+                return self._over(item) if self._reels(item, view) else Waypoint(None, math.nan)
             self._since = view.time if self._since is None else self._since
             if view.time - self._since >= wait:
                 return self._over(item)

@@ -50,15 +50,14 @@ from controller.ground.commands.setpoints import Offboard, Setpoint
 from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
 from controller.ground.flight.fence import Fence
 from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
-from controller.ground.flight.gripper import Gripper
 from controller.ground.flight.guidance import Guidance, Stage
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.patterns import Orbit, Pattern
+from controller.ground.flight.payload.payload import DELIVER, Payload
 from controller.ground.flight.preconditions import arming_faults, has_settled
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
 from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
-from controller.ground.flight.winch import Winch
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import WAYPOINT
 from controller.ground.missions.mission_plan import Fault, Item
@@ -98,11 +97,8 @@ class Machine:
         self.mode = Mode.HOLD
         self.offboard = Offboard()
         self.sticks = Sticks()
-        self.gripper = None if profile.gripper is None else Gripper(profile.gripper)
-        """None: there is none."""
-        self.winch = None if profile.winch is None else Winch(profile.winch, profile.rest_length)
-        """None: there is none."""
-        self.mission = MissionFlight(self.gripper)
+        self.payload = Payload(profile)
+        self.mission = MissionFlight(self.payload)
         self.failsafes = Failsafes()
         self.target: Target = Idle(False)
         self.notices: list[Notice] = []
@@ -308,10 +304,23 @@ class Machine:
 
     def grip(self, action: int) -> Verdict:
         """Release (0) or grab (1) the load; done when the outputs are live and the hook is within reach."""
-        if self.gripper is None:
+        if self.payload.gripper is None:
             return Verdict(UNSUPPORTED, "Gripper denied: this vehicle has none; see [gripper] in its file")
-        self.gripper.act(action)
+        self.payload.gripper.act(action)
         return OK
+
+    def reel(self, action: float, length: float, rate: float) -> Verdict:
+        """DO_WINCH; length (m) and rate (m/s) pay out. A delivery begins in Hold."""
+        if action == DELIVER and self.payload.delivers:
+            if self.payload.delivering:
+                return OK
+            if self.stage is not Stage.FLYING or self.view is None:
+                return not_now("Delivery denied: not flying with the load; take off first")
+            fault = self.payload.delivery_fault(self.view)
+            if fault:
+                return deny(f"Delivery denied: {fault}")
+            self.enter(Mode.HOLD)
+        return self.payload.work_winch(action, length, rate, self.view)
 
     def reeled(self, change: float) -> None:
         """The winch has made the cable longer by so much, m: what was said of the load is still meant."""
@@ -479,10 +488,16 @@ class Machine:
             return Idle(False)
         if self.stage is Stage.GROUND:
             return Idle(True)
+        if text := self.payload.update(view):
+            self.say(INFO, text)
         asked = self.offboard.latest
         if self.mode in BY_STICKS and self.stage is Stage.FLYING:
             asked = self.sticks.setpoint(view, self.parameters, self.mode is Mode.POSITION)
-        return self._guidance.target(view, asked, self.target)
+        target = self._guidance.target(view, asked, self.target)
+        refusals, self.mission.refusals = self.mission.refusals, []
+        for text in refusals:
+            self.say(WARNING, text)
+        return target
 
     def _on_ground(self, view: VehicleView, now: float) -> None:
         if self.mode in (Mode.TAKEOFF, Mode.MISSION) or (self._setpoint_lifts(view, now)):
@@ -506,6 +521,8 @@ class Machine:
         """Change the mode; in flight it begins now."""
         if self.mode is Mode.MISSION and mode is not Mode.MISSION:
             self.mission.pause()
+        if self.payload.break_off():
+            self.say(INFO, "Delivery broken off: reeling in")
         self._guidance.forget_destination()
         self.sticks.rest()
         if mode in BY_STICKS and self.view is not None:
@@ -549,6 +566,7 @@ class Machine:
     def _disarm(self, text: str) -> None:
         self.armed = False
         self._guidance.end()
+        self.payload.stop_delivery()
         self.mission.pause()
         self.failsafes.reset()
         self.mode = Mode.HOLD

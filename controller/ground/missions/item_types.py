@@ -15,6 +15,7 @@ PAYLOAD_PLACE: int = mavlink.MAV_CMD_NAV_PAYLOAD_PLACE
 DELAY: int = mavlink.MAV_CMD_NAV_DELAY
 CONDITION_DELAY: int = mavlink.MAV_CMD_CONDITION_DELAY
 GRIPPER: int = mavlink.MAV_CMD_DO_GRIPPER
+WINCH: int = mavlink.MAV_CMD_DO_WINCH
 JUMP: int = mavlink.MAV_CMD_DO_JUMP
 CHANGE_SPEED: int = mavlink.MAV_CMD_DO_CHANGE_SPEED
 SET_HOME: int = mavlink.MAV_CMD_DO_SET_HOME
@@ -66,7 +67,7 @@ WITHOUT_EFFECT: dict[int, str] = {
     **dict.fromkeys(_GIMBAL, "gimbal"),
     **dict.fromkeys(_OUTPUTS, "servo"),
     GRIPPER: "gripper",
-    mavlink.MAV_CMD_DO_WINCH: "winch",
+    WINCH: "winch",
 }
 """Commands for hardware that is not there, with its name"""
 _MARKS = (

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.fence import Fence
+from controller.ground.flight.payload.payload import winch_fault
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,
     DELAYS,
@@ -22,6 +23,7 @@ from controller.ground.missions.item_types import (
     SUPPORTED,
     TAKEOFF,
     WAYPOINT,
+    WINCH,
     WITH_PLACE,
     WITH_POSITION,
     WITHOUT_EFFECT,
@@ -111,13 +113,11 @@ def remarks(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fe
     idle: dict[str, list[str]] = {}
     low = []
     for index, item in enumerate(items):
-        if item.command == GRIPPER and profile.gripper is not None:
-            continue
-        if item.command in WITHOUT_EFFECT:
+        works = _works(item, profile)
+        if item.command in WITHOUT_EFFECT and not works:
             idle.setdefault(WITHOUT_EFFECT[item.command], []).append(str(index))
-        elif item.command == PAYLOAD_PLACE:
-            placing = "gripper" if profile.gripper is None else "payload placing"
-            idle.setdefault(placing, []).append(str(index))
+        elif item.command == PAYLOAD_PLACE and not works:
+            idle.setdefault("gripper" if profile.gripper is None else "winch", []).append(str(index))
         if item.has_place and item.command not in (LAND, TAKEOFF):
             low += [str(index)] if fence.too_low(place(item, profile, home)) else []
     texts = [
@@ -130,6 +130,14 @@ def remarks(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fe
     return texts
 
 
+def _works(item: Item, profile: Profile) -> bool:
+    """Whether the vehicle has the gripper or winch that an item works."""
+    if item.command == PAYLOAD_PLACE:
+        return profile.gripper is not None and profile.winch is not None
+    fitted = profile.gripper if item.command == GRIPPER else profile.winch
+    return item.command in (GRIPPER, WINCH) and fitted is not None
+
+
 def _listed(indices: list[str]) -> str:
     return ", ".join(indices[:8]) + (", ..." if len(indices) > 8 else "")
 
@@ -138,6 +146,8 @@ def _check_numbers(item: Item, count: int) -> Fault | None:
     """Command and parameters that are no place."""
     if item.command not in SUPPORTED:
         return Fault(mavlink.MAV_MISSION_UNSUPPORTED, f"command {item.command} is not supported; remove it")
+    if item.command == WINCH and (fault := winch_fault(item.p2, item.p3, item.p4)):
+        return Fault(mavlink.MAV_MISSION_INVALID_PARAM2, f"winch: {fault}")
     if item.command in WITHOUT_EFFECT:
         return None
     first, second = mavlink.MAV_MISSION_INVALID_PARAM1, mavlink.MAV_MISSION_INVALID_PARAM2

@@ -36,6 +36,7 @@ DEFAULT_RATES: dict[int, float] = {
     mavlink.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 2.0,
     FigureEightStatus.id: 2.0,
     mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE: 1.0,
+    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: 2.0,
 }
 """Hz, of each message that is sent unasked. PX4's 50 Hz makes clients on a busy machine drop some."""
 

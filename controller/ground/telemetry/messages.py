@@ -394,6 +394,22 @@ def _orbit_status(machine: Machine, view: VehicleView) -> Any:
     )
 
 
+def _winch_status(machine: Machine, view: VehicleView) -> Any:
+    winch = machine.payload.winch
+    if winch is None or winch.report is None:
+        return None
+    return mavlink.MAVLink_winch_status_message(
+        _microseconds(view),
+        winch.report.length,
+        winch.report.speed,
+        winch.report.tension,
+        math.nan,
+        math.nan,
+        NOT_KNOWN_INT16,
+        winch.status,
+    )
+
+
 def _figure_eight_status(machine: Machine, view: VehicleView) -> Any:
     figure = machine.pattern
     if not isinstance(figure, FigureEight) or machine.stage is not Stage.FLYING:
@@ -409,6 +425,7 @@ def _figure_eight_status(machine: Machine, view: VehicleView) -> Any:
 BUILDERS: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: _orbit_status,
     FigureEightStatus.id: _figure_eight_status,
+    mavlink.MAVLINK_MSG_ID_WINCH_STATUS: _winch_status,
     mavlink.MAVLINK_MSG_ID_ATTITUDE: _attitude,
     mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: _attitude_quaternion,
     mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: _local_position,
@@ -461,8 +478,9 @@ def autopilot_version(machine: Machine) -> Any:
     version = VERSION[0] << 24 | VERSION[1] << 16 | VERSION[2] << 8 | mavlink.FIRMWARE_VERSION_TYPE_DEV
     empty = [0] * 8
     uid = _UID + machine.profile.instance
+    gripper = mavlink.MAV_PROTOCOL_CAPABILITY_GRIPPER if machine.payload.gripper is not None else 0
     return mavlink.MAVLink_autopilot_version_message(
-        CAPABILITIES, version, version, 0, 0, empty, empty, empty, 0, 0, uid
+        CAPABILITIES | gripper, version, version, 0, 0, empty, empty, empty, 0, 0, uid
     )
 
 

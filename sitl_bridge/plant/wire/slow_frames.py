@@ -108,7 +108,7 @@ def winch_status(time_usec: int, reel: Reel, winch: Winch) -> Any:
         status |= common.MAV_WINCH_STATUS_FULLY_RETRACTED
     if reel.rate != 0.0:
         status |= common.MAV_WINCH_STATUS_MOVING
-    if not reel.free:
+    if reel.free:  # "engaged allowing motor to move freely", as MAVLink has it
         status |= common.MAV_WINCH_STATUS_CLUTCH_ENGAGED
     return common.MAVLink_winch_status_message(
         time_usec=time_usec,

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from enum import IntFlag
+from typing import NamedTuple
+
 from sitl_bridge.vehicle.description import Winch as Description
 
 _STIFFNESS = 1.0
@@ -10,6 +14,32 @@ _ACCELERATION = 0.4
 """m/s², with which the rate grows: what the load gains the vehicle loses, until the rotors have followed"""
 _THERE = 0.01
 """m, near enough to a length"""
+
+
+class WinchWork(IntFlag):
+    """What the winch is at: those bits of MAV_WINCH_STATUS_FLAG that only whoever commands it knows."""
+
+    NONE = 0
+    LOCKED = 16
+    DROPPING = 32
+    GROUND_SENSE = 128
+    RETRACTING = 256
+    ABANDON_LINE = 1024
+    LOAD_LINE = 4096
+    LOAD_PAYLOAD = 8192
+
+
+class Report(NamedTuple):
+    """WINCH_STATUS, as the winch says it."""
+
+    length: float
+    """m, of the cable's rest length"""
+    speed: float
+    """m/s, positive pays out"""
+    tension: float
+    """N"""
+    status: int
+    """MAV_WINCH_STATUS_FLAG"""
 
 
 class Winch:
@@ -23,6 +53,9 @@ class Winch:
 
     def restart(self) -> None:
         """As described, and locked."""
+        self.report: Report | None = None
+        """The last"""
+        self.work = WinchWork.NONE
         self.length, self.speed = self._first, 0.0
         """m and m/s, of the rest length: as reported, and as moved on since"""
         self.free = False
@@ -34,9 +67,10 @@ class Winch:
         self._commanded = 0.0
         """m/s, now"""
 
-    def heard(self, length: float, speed: float) -> None:
-        """A report of the winch, m and m/s."""
-        self.length, self.speed = length, speed
+    def heard(self, report: Report) -> None:
+        """A report of the winch; one without numbers is none."""
+        if math.isfinite(report.length + report.speed):
+            self.report, self.length, self.speed = report, report.length, report.speed
 
     def advance(self, seconds: float) -> None:
         """Time goes by since the last report, and the command follows what is wanted."""
@@ -50,19 +84,38 @@ class Winch:
     def relax(self) -> None:
         """Open the clutch: the cable runs out by its tension."""
         self.target, self._rate, self.free = None, 0.0, True
+        self.work = WinchWork.NONE
 
     def go_by(self, length: float, rate: float) -> None:
         """Pay out (positive) or reel in so much, m, at a rate, m/s (0: the winch's own)."""
-        d = self.description
-        low, high = min(d.min_length, self._first), max(d.max_length, self._first)
-        self.target = min(max(self.length + length, low), high)
-        self._most = min(abs(rate) or d.rate, d.rate)
+        most = self.description.rate
+        self.target = min(max(self.length + length, self.shortest), self.longest)
+        self._most = min(abs(rate) or most, most)
         self.free = False
+        self.work = WinchWork.NONE
 
     def turn(self, rate: float) -> None:
         """Pay out (positive) or reel in at a rate, m/s; 0: stand."""
         most = self.description.rate
         self.target, self._rate, self.free = None, min(max(rate, -most), most), False
+        self.work = WinchWork.NONE
+
+    @property
+    def shortest(self) -> float:
+        """m, to which the cable can be reeled in."""
+        return min(self.description.min_length, self._first)
+
+    @property
+    def longest(self) -> float:
+        """m, to which the cable can be paid out."""
+        return max(self.description.max_length, self._first)
+
+    @property
+    def status(self) -> int:
+        """MAV_WINCH_STATUS_FLAG: what was reported, and what the winch is at."""
+        reported = 0 if self.report is None else self.report.status
+        over = self.done and self.work is not WinchWork.LOCKED and self.target is not None
+        return reported | (0 if over else self.work)
 
     @property
     def done(self) -> bool:

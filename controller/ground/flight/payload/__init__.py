@@ -1,0 +1,1 @@
+"""What hangs below: gripper, winch, and the delivery of a load."""
