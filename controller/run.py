@@ -13,6 +13,7 @@ from controller.feedback.truth import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import AwakeClock
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.lossy_link import LossyLink
 from sitl_bridge.process import Speaker, StopRequest
@@ -48,6 +49,8 @@ class ControllerOptions:
     feedback: str = "truth"
     out: Path | None = None
     """Where the estimate's log goes."""
+    logs: Logs = "usual"
+    """How much goes there."""
     law: ChosenLaw | None = None
     """A law of the user's own, instead of the design."""
 
@@ -157,7 +160,7 @@ def _estimating(
     from controller.feedback.health import EstimateAssessor
     from controller.feedback.log import EstimateLog
 
-    log = None if options.out is None else EstimateLog(options.out)
+    log = None if options.out is None else EstimateLog(options.out, options.logs)
     alone = options.path_from is not None
     feedback = EstimateFeedback(options.vehicle, options.rate_hz, log, speaker.say, only_good=alone)
     return log, feedback, EstimateAssessor(feedback)
@@ -169,7 +172,7 @@ def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedbac
     from controller.feedback.log import EstimateLog
 
     assert options.out is not None
-    log = EstimateLog(options.out)
+    log = EstimateLog(options.out, options.logs)
     beside = EstimateFeedback(options.vehicle, options.rate_hz, log)
     return log, TruthBesideEstimate(beside, options.rate_hz)
 

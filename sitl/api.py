@@ -21,7 +21,7 @@ from sitl.flights.in_process import InProcessFlight, fly_in_process
 from sitl.flights.metrics import flight_metrics, reference_positions
 from sitl.flights.outcome import judge
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import PROMISED, draw, read_state_log, write_report
+from sitl.flights.report import PROMISED, clear, draw, read_state_log, write_report, write_summary
 from sitl.flights.scenario import (
     GroundControl,
     Scenario,
@@ -32,6 +32,7 @@ from sitl.flights.scenario import (
     with_agility,
 )
 from sitl.json_values import plain
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.plant.log.state_log import FILE_NAME
 from sitl_bridge.vehicle.description import Vehicle
@@ -88,6 +89,7 @@ def fly(
     rate_hz: float = 250.0,
     duration_s: float | None = None,
     out: str | Path | None = None,
+    logs: Logs = "usual",
 ) -> Flight:
     """Fly a scenario, and return when it is over.
 
@@ -97,7 +99,7 @@ def fly(
     `controller.own_law.interface`, or its name as for `--law`. agility: how fast the load goes to its
     reference, 0 (gentle) to 1 (all that the vehicle can do), by default the scenario's, else 0.7. feedback:
     `truth` or `estimate`, by default as for `sitl fly`. out: a folder for all that `sitl fly` leaves; by
-    default nothing is written.
+    default nothing is written. logs: how much is left there, `none` (the summary), `usual` or `all`.
 
     Raises DescriptionError, with a line for each fault, for what cannot be flown; LawError when the law
     fails in flight.
@@ -116,7 +118,8 @@ def fly(
     if chosen is not None and design != "default":
         raise DescriptionError("law", [f"instead of a design; leave out design={design!r}"])
     feedback = feedback or usual_feedback(described, told)
-    folder = None if out is None else Path(out)
+    written = None if out is None else Path(out)
+    folder = None if logs == "none" else written
     ended = fly_in_process(
         InProcessFlight(
             told=told,
@@ -130,6 +133,7 @@ def fly(
             faults=checked(described.faults, told),
             law=chosen,
             out=folder,
+            logs=logs,
         )
     )
     if ended.law_failure is not None:
@@ -151,10 +155,14 @@ def fly(
     if folder is None:
         states = dict(zip(ended.names, np.asarray(ended.states).T, strict=True))
         summary, estimates = _summary(facts, path, states, told), None
+        if written is not None:
+            written.mkdir(parents=True, exist_ok=True)
+            clear(written)
+            write_summary(written, summary)
     else:
-        summary, states, estimates = _written(facts, path, folder, told, feedback)
+        summary, states, estimates = _written(facts, path, folder, told, feedback, logs)
     reference = reference_positions(path, states["time_s"])
-    return Flight(summary, states, estimates, reference, tuple(ended.said), folder)
+    return Flight(summary, states, estimates, reference, tuple(ended.said), written)
 
 
 def _checked_agility(agility: float | None) -> float | None:
@@ -191,14 +199,14 @@ def _summary(
 
 
 def _written(
-    facts: dict[str, Any], path: ReferencePath, folder: Path, told: Vehicle, feedback: str
+    facts: dict[str, Any], path: ReferencePath, folder: Path, told: Vehicle, feedback: str, logs: Logs
 ) -> tuple[dict[str, Any], dict[str, Array], dict[str, Array] | None]:
     from controller.feedback.log import ESTIMATE_NAME
     from controller.feedback.truth import estimates
     from sitl.flights.keep import keep_recording
 
     summary = write_report(folder, facts, path, told if estimates(feedback, told) else None, told)
-    keep_recording(folder, told, path)
+    keep_recording(folder, told, path, logs)
     estimate_log = folder / ESTIMATE_NAME
     found = read_state_log(estimate_log) if estimate_log.exists() else None
     return summary, read_state_log(folder / FILE_NAME), found

@@ -26,6 +26,7 @@ from sitl.command_line.vehicle import add_vehicle
 from sitl.command_line.view import add_view
 from sitl.command_line.warmup import add_warmup
 from sitl_bridge.ids import HIL_TCP_PORT, HIL_UDP_PORT, MOST_INSTANCES
+from sitl_bridge.log_amount import LOGS
 from sitl_bridge.vehicle.files import preset_names, vehicle_names
 
 DEFAULT_RATE_HZ = 250.0
@@ -124,6 +125,7 @@ def build_parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="one JSON object on standard output at the end"
     )
     controller.add_argument("--out", metavar="DIR", type=Path, help="where to write the estimate's log")
+    _logs(controller)
     _over(controller)
 
     add_export(commands)
@@ -391,7 +393,18 @@ def _view(parser: argparse.ArgumentParser) -> None:
 
 def _output(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, help="where to write logs and results")
+    _logs(parser)
     parser.add_argument("--json", action="store_true", help="one JSON object on standard output at the end")
+
+
+def _logs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--logs",
+        choices=LOGS,
+        default="usual",
+        help="how much is written: none, only the summary; usual, every state, but only some of the link's "
+        "messages and estimates; all of them (default: %(default)s)",
+    )
 
 
 def _supervised(parser: argparse.ArgumentParser) -> None:

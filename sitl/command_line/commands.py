@@ -145,7 +145,8 @@ def _plant(arguments: argparse.Namespace) -> int:
         duration_s=arguments.duration or (scenario.duration if scenario else None),
         drop_percent=arguments.drop,
         on_silence=timing.on_silence,
-        out=arguments.out,
+        out=None if arguments.logs == "none" else arguments.out,
+        logs=arguments.logs,
         faults=_faults_of(scenario, vehicle),
         end_when_lost=arguments.until_eof and scenario is not None and not _ground_piloted(scenario),
         load_to=arguments.load_to,
@@ -207,7 +208,8 @@ def _control(
         seed=arguments.seed,
         ground=_ground_options(arguments),
         feedback=arguments.feedback or usual_feedback(scenario, vehicle),
-        out=arguments.out,
+        out=None if arguments.logs == "none" else arguments.out,
+        logs=arguments.logs,
         law=law,
     )
     return run(options, speaker, stop)
@@ -251,6 +253,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         drop_percent=arguments.drop,
         instance=arguments.instance,
         out=arguments.out,
+        logs=arguments.logs,
         in_process=arguments.in_process,
         law=law,
     )

@@ -1,6 +1,6 @@
 """MCAP for Foxglove and PlotJuggler: Foxglove's schemas for what is drawn, JSON for what is plotted.
 
-Frames: `world` (ENU), `vehicle` (FLU) and `load`. Rates: see RATE_HZ; the state log keeps every tick.
+Frames: `world` (ENU), `vehicle` (FLU) and `load`. Rates: see RATES_HZ; the state log keeps every tick.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ import numpy as np
 from sitl.recording.recording import Array, Recording
 from sitl.recording.sensors import SensorLog, read_sensors
 from sitl_bridge.frames import LocalOrigin
+from sitl_bridge.log_amount import Logs
 
 FILE_NAME = "flight.mcap"
-RATE_HZ = 50.0
-"""Most samples a second of a channel."""
+RATES_HZ: dict[Logs, float] = {"usual": 20.0, "all": 50.0}
+"""Most samples a second of a channel, by how much a flight leaves."""
 SLOW_HZ = 5.0
 """Of a map's positions and of the scene."""
 NANOSECONDS = 1_000_000_000
 
 
-def write_mcap(recording: Recording, file: Path) -> None:
-    """Write the flight beside its other logs; an older file is replaced."""
-    with _writer(recording, file) as writer:
-        for row in _rows(recording.times, RATE_HZ):
+def write_mcap(recording: Recording, file: Path, rate_hz: float = RATES_HZ["all"]) -> None:
+    """Write the flight beside its other logs; an older file is replaced. rate_hz: most, of a channel."""
+    with _writer(recording, file, rate_hz) as writer:
+        for row in _rows(recording.times, rate_hz):
             writer.tick(row)
         for row in _rows(recording.times, SLOW_HZ):
             writer.slow(row)
@@ -48,13 +49,13 @@ def _rows(times: Array, rate_hz: float) -> list[int]:
 
 
 @contextmanager
-def _writer(recording: Recording, file: Path) -> Iterator[_FlightWriter]:
+def _writer(recording: Recording, file: Path, rate_hz: float) -> Iterator[_FlightWriter]:
     import foxglove
 
     context = foxglove.Context()
     sink = foxglove.open_mcap(file, allow_overwrite=True, context=context)
     try:
-        yield _FlightWriter(recording, context)
+        yield _FlightWriter(recording, context, rate_hz)
     finally:
         sink.close()
 
@@ -67,13 +68,13 @@ REFERENCE = ("x_m", "y_m", "z_m", "error_m")
 class _FlightWriter:
     """The channels of one file."""
 
-    def __init__(self, recording: Recording, context: Any) -> None:
+    def __init__(self, recording: Recording, context: Any, rate_hz: float) -> None:
         from foxglove import channels, messages
 
         from sitl.export import scene
 
         self._m, self._scene, self._context = messages, scene, context
-        self._recording = recording
+        self._recording, self._rate_hz = recording, rate_hz
         self._epoch = round((recording.summary.get("first_command_unix_s") or 0.0) * NANOSECONDS)
         self._transforms = channels.FrameTransformsChannel("/tf", context=context)
         self._bodies = channels.SceneUpdateChannel("/scene", context=context)
@@ -156,7 +157,7 @@ class _FlightWriter:
         """The autopilot's estimate."""
         names = [name for name in estimates if name != "time_s"]
         channel = self._channel("/estimate", names)
-        for row in _rows(estimates["time_s"], RATE_HZ):
+        for row in _rows(estimates["time_s"], self._rate_hz):
             numbers = {name: _finite(estimates[name][row]) for name in names}
             channel.log(numbers, log_time=self._time(float(estimates["time_s"][row]))[0])
 
@@ -168,7 +169,7 @@ class _FlightWriter:
         ):
             names = [name for name in records.dtype.names or () if name != "time_usec"]
             channel = self._channel(topic, names)
-            for row in _rows(times, RATE_HZ):
+            for row in _rows(times, self._rate_hz):
                 numbers = {name: _finite(records[name][row]) for name in names}
                 channel.log(numbers, log_time=self._time(float(times[row]))[0])
 
@@ -194,6 +195,8 @@ def _numbers(names: Sequence[str], row: Array) -> dict[str, float | None]:
 
 
 def _finite(value: Any) -> float | None:
-    """A number as JSON has it."""
+    """A number as JSON has it: with seven digits, but whole numbers with all of theirs."""
     number = float(value)
-    return number if math.isfinite(number) else None
+    if number.is_integer():
+        return number
+    return float(f"{number:.7g}") if math.isfinite(number) else None

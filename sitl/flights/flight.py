@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from controller.own_law.find import ChosenLaw, make
 from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, watch
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import OF_THE_PLANT, clear, write_report
+from sitl.flights.report import OF_THE_PLANT, clear, without_files, write_report, write_summary
 from sitl.flights.scenario import (
     GroundControl,
     Scenario,
@@ -27,6 +28,7 @@ from sitl.flights.scenario import (
 )
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links import Address, open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest
@@ -63,6 +65,8 @@ class FlightOptions:
     instance: int
     out: Path | None
     """None: a new folder under runs/; under ground control, no logs."""
+    logs: Logs = "usual"
+    """How much is left there."""
     truth_to: tuple[str, int] | None = None
     """Host and port of a viewer that is shown the truth."""
     in_process: bool = False
@@ -95,7 +99,7 @@ class FlightOptions:
         if self.truth_to is not None:
             plant += ["--truth-to", "{}:{}".format(*self.truth_to)]
         if self.out is not None:
-            plant += ["--out", str(self.out)]
+            plant += ["--out", str(self.out), "--logs", self.written]
         controller = [*common, "--hil", str(self.other_end), "--design", self.design]
         if self.law is not None:
             controller += ["--law", self.law.name]
@@ -104,8 +108,13 @@ class FlightOptions:
         if self.feedback is not None:
             controller += ["--feedback", self.feedback]
         if self.out is not None:
-            controller += ["--out", str(self.out)]
+            controller += ["--out", str(self.out), "--logs", self.written]
         return plant, [*controller, *self.ground]
+
+    @property
+    def written(self) -> Logs:
+        """How much is written while it flies: a summary is made from logs, even if they are not kept."""
+        return "usual" if self.logs == "none" else self.logs
 
     @property
     def other_end(self) -> Address:
@@ -187,6 +196,7 @@ def _fly_here(
             faults=checked(scenario.faults, told),
             law=options.law,
             out=options.out,
+            logs=options.written,
         ),
         stop,
         show,
@@ -220,6 +230,17 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     assert options.out is not None
     options.out.mkdir(parents=True, exist_ok=True)
     clear(options.out)
+    if options.logs != "none":
+        return _fly_into(options, options.out, vehicle, stop), options.out
+    with tempfile.TemporaryDirectory(prefix="sitl-fly-") as folder:
+        summary = without_files(_fly_into(options, Path(folder), vehicle, stop))
+    write_summary(options.out, summary)
+    return summary, options.out
+
+
+def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopRequest) -> dict[str, Any]:
+    """Fly; logs go to a folder that is empty. Returns the summary."""
+    options, scenario = replace(options, out=out), options.scenario
     assert not isinstance(scenario.reference, GroundControl)  # see `sitl.flights.hold`
     path_from = scenario.reference.path
     start = vehicle.initial_load_position
@@ -263,6 +284,8 @@ def fly(options: FlightOptions, stop: StopRequest) -> tuple[dict[str, Any], Path
     }
     path = path_from(start)
     estimating = vehicle if estimates(feedback, vehicle) else None
-    summary = write_report(options.out, facts, path, estimating, vehicle)
-    keep_recording(options.out, vehicle, path)
-    return summary, options.out
+    kept = options.logs != "none"
+    summary = write_report(out, facts, path, estimating, vehicle, picture=kept)
+    if kept:
+        keep_recording(out, vehicle, path, options.logs)
+    return summary

@@ -1,6 +1,6 @@
 """`flight.html`: a flight's report as one self-contained, interactive page (plotly), with no network needed.
 
-plotly's script is kept compressed in the page, and unpacked by the browser: a fifth of its size.
+Data and plotly's script are kept compressed in the page, and unpacked by the browser: a fifth of their size.
 """
 
 from __future__ import annotations
@@ -168,10 +168,14 @@ def _facts(summary: dict[str, Any]) -> str:
 
 def _page(summary: dict[str, Any], figure: dict[str, Any]) -> str:
     script = (resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes()
-    packed = base64.b64encode(gzip.compress(script, 9, mtime=0)).decode()
     title = html.escape(f"{summary.get('scenario')}: {summary.get('vehicle')}")
-    data = json.dumps(figure, allow_nan=False).replace("</", "<\\/")
-    return _TEMPLATE.format(title=title, facts=_facts(summary), packed=packed, data=data)
+    data = json.dumps(figure, allow_nan=False)
+    facts = _facts(summary)
+    return _TEMPLATE.format(title=title, facts=facts, script=_packed(script), data=_packed(data.encode()))
+
+
+def _packed(content: bytes) -> str:
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
 
 _TEMPLATE = """<!doctype html>
@@ -194,17 +198,18 @@ Click a name to hide its line, drag to zoom, double-click to go back.</p>
 <details><summary>All figures of the flight</summary><table>
 {facts}
 </table></details>
-<script type="application/json" id="data">{data}</script>
-<script type="application/octet-stream" id="plotly">{packed}</script>
+<script type="application/octet-stream" id="data">{data}</script>
+<script type="application/octet-stream" id="plotly">{script}</script>
 <script>
 (async () => {{
-  const text = document.getElementById("plotly").textContent;
-  const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const unpacked = id => {{
+    const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), c => c.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }};
   const script = document.createElement("script");
-  script.textContent = await new Response(stream).text();
+  script.textContent = await unpacked("plotly");
   document.head.appendChild(script);
-  const figure = JSON.parse(document.getElementById("data").textContent);
+  const figure = JSON.parse(await unpacked("data"));
   await Plotly.newPlot("figure", figure.data, figure.layout, {{responsive: true}});
   document.body.dataset.ready = "yes";
 }})();

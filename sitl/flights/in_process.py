@@ -19,9 +19,10 @@ from controller.feedback.truth import PathFrom
 from controller.own_law.find import ChosenLaw
 from controller.own_law.interface import LawError
 from controller.run import ControllerOptions, Session, open_session
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links import Address
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
-from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.mavlink.tlog import RECORDED_HZ, TlogWriter
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices
@@ -62,6 +63,8 @@ class InProcessFlight:
     """A law of the user's own, instead of the design."""
     out: Path | None = None
     """Where logs go; None: they are kept in memory."""
+    logs: Logs = "usual"
+    """How much goes there."""
 
 
 @dataclass
@@ -148,7 +151,7 @@ def fly_in_process(
     else:
         flight.out.mkdir(parents=True, exist_ok=True)
         recorder = StateLog(flight.out / FILE_NAME, simulation.world)
-        tlog = TlogWriter(flight.out / TLOG_NAME)
+        tlog = TlogWriter(flight.out / TLOG_NAME, RECORDED_HZ[flight.logs])
     simulation.record_with(recorder)
     session = open_session(_controller_options(flight), speaker)
     clock = Lockstep(simulation, Notices(speaker.say), flight.instance)
@@ -231,6 +234,7 @@ def _controller_options(flight: InProcessFlight) -> ControllerOptions:
         seed=flight.seed,
         feedback=flight.feedback,
         out=flight.out,
+        logs=flight.logs,
         law=flight.law,
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from controller.law.reference import Path as ReferencePath
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
+from sitl.export.mcap import RATES_HZ as MCAP_HZ
 from sitl.export.mcap import write_mcap
 from sitl.flights.html_report import FILE_NAME as HTML_NAME
 from sitl.flights.html_report import write_html
@@ -19,6 +20,7 @@ from sitl.recording.recording import (
     write_reference,
     write_vehicle,
 )
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.plant.log.state_log import FILE_NAME as STATES_NAME
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -26,10 +28,10 @@ REFERENCE_EVERY = 5
 """Ticks between two rows of the reference that is kept."""
 
 
-def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath) -> None:
+def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath, logs: Logs = "usual") -> None:
     """Write what a flight leaves for other tools; nothing where its state log is not complete.
 
-    vehicle: as the controller was told; path: the reference that was flown.
+    vehicle: as the controller was told; path: the reference that was flown; logs: how much.
     """
     try:
         times = read_columns(out / STATES_NAME)["time_s"]
@@ -41,5 +43,5 @@ def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath) -> None:
     kept = np.unique(np.append(times[::REFERENCE_EVERY], times[-1]))
     write_reference(out, kept, reference_positions(path, kept))
     recording = read_recording(out)
-    write_mcap(recording, out / MCAP_NAME)
+    write_mcap(recording, out / MCAP_NAME, MCAP_HZ[logs])
     write_html(recording, out / HTML_NAME)

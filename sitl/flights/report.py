@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,7 @@ def read_state_log(path: Path) -> Log:
         table = pq.read_table(path)
     except pa.ArrowInvalid as error:
         raise ValueError(f"{path} is not complete: {error}") from None
-    return {name: table[name].to_numpy() for name in table.column_names}
+    return {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in table.column_names}
 
 
 def positions(log: Log, body: str) -> NDArray[np.float64]:
@@ -91,11 +92,13 @@ def write_report(
     path: ReferencePath | None,
     vehicle: Vehicle | None = None,
     described: Vehicle | None = None,
+    picture: bool = True,
 ) -> dict[str, Any]:
     """Write summary.json and the picture next to the state log; returns the summary.
 
     facts: what is known besides the log; path: the reference, None when nothing has flown; vehicle: as the
-    controller was told, where it has left a log of its estimate; described: as it was told in any case.
+    controller was told, where it has left a log of its estimate; described: as it was told in any case;
+    picture: whether to draw one.
     """
     state_log = out / FILE_NAME
     summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
@@ -114,15 +117,29 @@ def write_report(
                 summary |= judge(log, reference, described, summary)._asdict()
             if vehicle is not None and (out / ESTIMATE_NAME).exists():
                 summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
-            draw(out / PICTURE_NAME, log, reference, facts)
-            summary["picture"] = str(out / PICTURE_NAME)
+            if picture:
+                draw(out / PICTURE_NAME, log, reference, facts)
+                summary["picture"] = str(out / PICTURE_NAME)
         summary["state_log"] = str(state_log)
         summary["state_log_sha256"] = hashlib.sha256(state_log.read_bytes()).hexdigest()
     summary["settled"] = bool(summary["settled"] and facts.get("completed"))
     summary = {key: plain(value) for key, value in summary.items()}  # a flight that diverged has no figures
+    write_summary(out, summary)
+    return summary
+
+
+def write_summary(out: Path, summary: dict[str, Any]) -> None:
+    """Write summary.json."""
     text = json.dumps(summary, indent=2, allow_nan=False)
     (out / SUMMARY_NAME).write_text(text + "\n", encoding="utf-8")
-    return summary
+
+
+def without_files(summary: dict[str, Any]) -> dict[str, Any]:
+    """The summary of a flight whose logs were not kept: without their paths."""
+    of_estimate = summary.get("estimate")
+    if of_estimate is not None:
+        of_estimate = {**of_estimate, "estimate_log": None, "covariance_log": None}
+    return {**summary, "state_log": None, "tlog": None, "estimate": of_estimate}
 
 
 def estimate_report(
@@ -146,12 +163,17 @@ def estimate_report(
     }
 
 
+_SHADES = 64
+"""Of the picture: lines in few colours take a quarter of the size that true colours do."""
+
+
 def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, Any]) -> None:
     """Picture of a flight: load and vehicle against the reference, cable length, rotor speeds."""
     import matplotlib
 
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
+    from PIL import Image
 
     time = log["time_s"]
     load, vehicle = positions(log, "load"), positions(log, "vehicle")
@@ -178,5 +200,12 @@ def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, 
         f"{facts['scenario']}: vehicle {facts['vehicle']}, {flies}, "
         f"{facts['clock']} at {facts['rate_hz']:g} Hz"
     )
-    figure.savefig(file, dpi=110)
+    if file.suffix.lower() != ".png":
+        figure.savefig(file, dpi=110)
+        plt.close(figure)
+        return
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=110, format="png")
     plt.close(figure)
+    few = Image.open(drawn).convert("RGB").quantize(_SHADES, dither=Image.Dither.NONE)
+    few.save(file, "png", optimize=True)

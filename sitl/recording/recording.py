@@ -98,7 +98,7 @@ def read_columns(file: Path) -> Columns:
         raise RecordingError(f"{file}: no such file; expected the folder of a finished flight") from None
     except pa.ArrowInvalid as error:
         raise RecordingError(f"{file} is not complete: {error}") from None
-    return {name: table[name].to_numpy() for name in table.column_names}
+    return {name: np.asarray(table[name].to_numpy(), dtype=np.float64) for name in table.column_names}
 
 
 def read_recording(folder: Path) -> Recording:

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.mavlink.lossy_link import LossyLink
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
-from sitl_bridge.mavlink.tlog import TlogWriter
+from sitl_bridge.mavlink.tlog import RECORDED_HZ, TlogWriter
 from sitl_bridge.plant.clocks.lateness import Lateness
 from sitl_bridge.plant.clocks.lockstep import Lockstep, OnSilence
 from sitl_bridge.plant.clocks.realtime import Realtime
@@ -52,6 +53,9 @@ class PlantOptions:
     drop_percent: float = 0.0
     on_silence: OnSilence = "wait"
     out: Path | None = None
+    """Where logs go."""
+    logs: Logs = "usual"
+    """How much goes there."""
     faults: Faults = NO_FAULTS
     load_to: tuple[str, int] | None = None
     """Ground station that is shown the load directly."""
@@ -124,7 +128,7 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         options.out.mkdir(parents=True, exist_ok=True)
         log = StateLog(options.out / FILE_NAME, simulation.world)
         simulation.record_with(log)
-        tlog = TlogWriter(options.out / TLOG_NAME)
+        tlog = TlogWriter(options.out / TLOG_NAME, RECORDED_HZ[options.logs])
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
     if options.faults.link:

@@ -42,7 +42,7 @@ def test_the_same_seed_gives_the_same_logs_whatever_is_lost(fly: Fly) -> None:
 def test_setpoint_on_the_estimate(fly: Fly) -> None:
     """The accuracy asked for, for one short flight, with half as much again for a single seed."""
     # The load stays within 30 cm, not within 2 % of the step: that is the GPS.
-    summary = fly("setpoint", *ON_ESTIMATE, "--duration", "40", expect=1)
+    summary = fly("setpoint", *ON_ESTIMATE, "--duration", "40", "--logs", "all", expect=1)
     assert summary["completed"]
     figures = summary["estimate"]
     assert all(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from pathlib import Path
@@ -49,6 +51,8 @@ def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -
     assert not re.search(r'(src|href)="', text)
     data = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)
     assert data is not None
-    traces = {trace["name"]: trace for trace in json.loads(data[1])["data"]}
+    traces = {
+        trace["name"]: trace for trace in json.loads(gzip.decompress(base64.b64decode(data[1])))["data"]
+    }
     assert max(traces["x of the load"]["y"]) == pytest.approx(recording.states["load_x_m"].max(), rel=1e-5)
     assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
