@@ -14,6 +14,9 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 from pymavlink.mavutil import mode_string_v10
 
+from controller.ground.missions.transfer import FENCE, MISSION, RALLY
+from sitl.view.plan import plan_of
+from sitl.view.plan_download import PlanDownload
 from sitl.view.view import View
 from sitl_bridge.frames import (
     DEG_E7_PER_DEG,
@@ -70,10 +73,11 @@ class Listener:
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._first_usec: int | None = None
         self._plant_system: int | None = None
+        self._plans = PlanDownload(STATION_SYSTEM, mavlink.MAV_COMP_ID_MISSIONPLANNER)
 
     def next_deadline(self) -> float:
         """When `to_send` has something at the latest."""
-        return self._next_heartbeat
+        return min(self._next_heartbeat, self._plans.next_deadline())
 
     def to_send(self, now: float) -> list[bytes]:
         """Our HEARTBEAT once a second, and requests for messages."""
@@ -87,7 +91,7 @@ class Listener:
             if self._plant_system is not None and not self.view.steerable:
                 wanted = mavlink.MAVLink_param_request_list_message(self._plant_system, COMPONENT_TRUTH)
                 out.append(self._station.pack(wanted))
-        return out
+        return out + [self._station.pack(message) for message in self._plans.to_send(now)]
 
     def set_plant(self, name: str, value: float) -> None:
         """Set a parameter of the plant, if there is one to set: SIM_SPEEDUP or SIM_STEPS."""
@@ -167,6 +171,7 @@ class Listener:
         if frame.system not in self._asked:
             self._asked.add(frame.system)
             self._out += [self._request(frame.system, wanted) for wanted in _WANTED]
+            self._plans.begin(frame.system, now)
 
     def _request(self, system: int, message_id: int) -> bytes:
         command = mavlink.MAVLink_command_long_message(
@@ -250,6 +255,17 @@ class Listener:
         nodes = tuple(enu_to_ned((parts[3 * i], parts[3 * i + 1], parts[3 * i + 2])) for i in range(count))
         self.view = replace(self.view, nodes=nodes)
 
+    def _on_plan(self, frame: Frame, message: Any, now: float) -> None:
+        if self._plans.take(message, frame.system, now) and self._origin is not None:
+            items = self._plans.items
+            plan = plan_of(items[MISSION], items[FENCE], items[RALLY], self._origin)
+            if plan != self.view.plan:
+                self.view = replace(self.view, plan=plan)
+
+    def _on_mission_current(self, frame: Frame, message: Any, now: float) -> None:
+        if frame.system == self._vehicle_system:
+            self._plans.current(frame, now)
+
     def _on_wind(self, frame: Frame, message: Any, now: float) -> None:
         self.view = replace(self.view, wind=enu_to_ned((message.wind_x, message.wind_y, message.wind_z)))
 
@@ -268,6 +284,9 @@ _HANDLERS = {
     mavlink.MAVLINK_MSG_ID_STATUSTEXT: Listener._on_text,
     mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: Listener._on_target,
     mavlink.MAVLINK_MSG_ID_WIND_COV: Listener._on_wind,
+    mavlink.MAVLINK_MSG_ID_MISSION_COUNT: Listener._on_plan,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: Listener._on_plan,
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: Listener._on_mission_current,
     mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: Listener._on_figure,
     mavlink.MAVLINK_MSG_ID_DEBUG_FLOAT_ARRAY: Listener._on_array,
 }

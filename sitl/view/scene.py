@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.export.shapes import disc_diameter, load_radius
+from sitl.view.plan_scene import PlanScene
 from sitl.view.view import View
 from sitl_bridge.frames import Quaternion, Triple
 from sitl_bridge.vehicle.cable_law import linear_cable
@@ -42,6 +43,7 @@ class Scene:
         self._trails = {body: deque[Triple](maxlen=TRAIL_POINTS) for body in _TRAILS}
         self._lines: dict[str, Any] = {}
         self._draw_ground()
+        self._plan = PlanScene(server.scene, vehicle.ground.height if vehicle.ground is not None else 0.0)
         self._body = self._scene.add_frame("/vehicle", show_axes=False, visible=False)
         self._blades = [self._draw_rotor(index) for index in range(len(vehicle.rotors))]
         radius = load_radius(vehicle)
@@ -56,6 +58,7 @@ class Scene:
         if view.load is not None:
             self._load.position, self._load.visible = view.load, True
         self._show_cable(view)
+        self._plan.show(view.plan)
         if view.set_point is not None:
             self._target.position, self._target.visible = view.set_point, True
         for body, at in (("vehicle", view.vehicle), ("load", view.load)):

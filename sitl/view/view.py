@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from sitl.view.plan import NO_PLAN, Plan
 from sitl_bridge.frames import Quaternion, Triple, rotate
 
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -36,6 +37,8 @@ class View:
     """m, of a cable that is a chain, from the vehicle to the load."""
     wind: Triple | None = None
     """m/s."""
+    plan: Plan = NO_PLAN
+    """Mission, geofence and rally points on board."""
     speed: float | None = None
     """Simulated seconds a second that the plant is asked for; 0: paused, below 0: as fast as it goes."""
     steerable: bool = False

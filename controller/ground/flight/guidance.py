@@ -233,7 +233,7 @@ class Guidance:
             items = self._mission.items
             first = next((item for item in items if item.command in WITH_POSITION), None)
             if first is not None and first.command == TAKEOFF:
-                altitude = plan.place(first, self._profile, self.home_geodetic())[2]
+                altitude = plan.place(first, self._profile.origin, self.home_geodetic())[2]
         height = self.height_of_takeoff(altitude, view)
         if height > self._asked_height(altitude) + 0.01 and self.home is not None:
             above = f"{height - self.home[2]:.1f} m"
@@ -440,7 +440,7 @@ class Guidance:
 
     def _place(self, item: plan.Item, view: VehicleView) -> Triple:
         """Of the vehicle, m: as the item says, or as high as the load needs (where it takes off or lands)."""
-        x, y, z = plan.place(item, self._profile, self.home_geodetic())
+        x, y, z = plan.place(item, self._profile.origin, self.home_geodetic())
         fence = self.fence(view.load_attached)
         return (x, y, max(z, fence.home[2] + fence.least_height))
 

@@ -423,7 +423,7 @@ class Machine:
             return Fault(fault.result, f"Reposition denied: {fault.text}")
         if item.command != WAYPOINT:
             return Fault(2, f"Reposition denied: command {item.command} is no way-point")  # UNSUPPORTED
-        x, y, z = plan.place(item, self.profile, self.home_geodetic())
+        x, y, z = plan.place(item, self.profile.origin, self.home_geodetic())
         point = (math.nan, math.nan, z) if only_height else (x, y, z)
         verdict = self.reposition(Reposition(False, point, math.nan, math.nan), True)
         return None if verdict.ok else Fault(14, verdict.text)  # MAV_MISSION_DENIED

@@ -29,7 +29,7 @@ from controller.ground.missions.item_types import (
     WITHOUT_EFFECT,
 )
 from controller.ground.telemetry.vehicle_state import Profile
-from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple
+from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, LocalOrigin, Triple
 
 AMSL_FRAMES = (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
 RELATIVE_FRAMES = (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
@@ -88,11 +88,11 @@ class Fault(NamedTuple):
     text: str
 
 
-def place(item: Item, profile: Profile, home: Geodetic) -> Triple:
-    """Where an item with a position is, m ENU."""
+def place(item: Item, origin: LocalOrigin, home: Geodetic) -> Triple:
+    """Where an item with a position is, m ENU from the origin."""
     altitude = item.z if item.frame in AMSL_FRAMES else home.altitude + item.z
     latitude, longitude = item.x / DEG_E7_PER_DEG, item.y / DEG_E7_PER_DEG
-    return profile.origin.local(Geodetic(latitude, longitude, altitude))
+    return origin.local(Geodetic(latitude, longitude, altitude))
 
 
 def check(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fence) -> Fault | None:
@@ -119,7 +119,7 @@ def remarks(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fe
         elif item.command == PAYLOAD_PLACE and not works:
             idle.setdefault("gripper" if profile.gripper is None else "winch", []).append(str(index))
         if item.has_place and item.command not in (LAND, TAKEOFF):
-            low += [str(index)] if fence.too_low(place(item, profile, home)) else []
+            low += [str(index)] if fence.too_low(place(item, profile.origin, home)) else []
     texts = [
         f"No {what} on this vehicle: no effect of mission items {_listed(where)}"
         for what, where in idle.items()
@@ -213,7 +213,7 @@ def _check_place(item: Item, profile: Profile, home: Geodetic, fence: Fence) -> 
         return Fault(mavlink.MAV_MISSION_UNSUPPORTED, "there is no ground to land on")
     if item.command not in WITH_POSITION:
         return None
-    point = place(item, profile, home)
+    point = place(item, profile.origin, home)
     if not item.has_place:  # above home, as far as the fence can tell before the flight
         point = (fence.home[0], fence.home[1], point[2])
     fault = fence.outside(point)
