@@ -18,9 +18,9 @@ from playwright.sync_api import sync_playwright
 import sitl
 from sitl.flights.free_ports import free_ports
 from sitl.recording.recording import read_recording
-from sitl.view.panel import Panel
+from sitl.view.page.panel import Panel
+from sitl.view.page.scene import Scene
 from sitl.view.replay import views_of_recording
-from sitl.view.scene import Scene
 from sitl.view.view import View
 from sitl_bridge.vehicle.files import load_vehicle
 

@@ -116,7 +116,7 @@ def _audience(
     from sitl.view.launch import check_installed, viewer
 
     check_installed()
-    return viewer(vehicle, more)
+    return viewer(vehicle, more, arguments.scenario)
 
 
 def _ground_piloted(scenario: Scenario) -> bool:

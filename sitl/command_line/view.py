@@ -41,6 +41,11 @@ def add_view(commands: Any) -> None:
         help="override one value of the description",
     )
     parser.add_argument(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="what is flown: draw the way and the set-point of its reference",
+    )
+    parser.add_argument(
         "--export", metavar="FILE.html", type=Path, help="write a finished flight as one self-contained page"
     )
     parser.add_argument(
@@ -80,6 +85,7 @@ def run_view(arguments: argparse.Namespace) -> int:
         flight=flights[0] if flights else None,
         vehicle=arguments.vehicle,
         overrides=arguments.set,
+        scenario=arguments.scenario,
         export=arguments.export,
         host="0.0.0.0" if arguments.expose else "127.0.0.1",
         port=arguments.port,

@@ -29,16 +29,21 @@ def check_installed() -> None:
 
 
 @contextlib.contextmanager
-def viewer(vehicle: Vehicle, more: Sequence[Address] = ()) -> Iterator[tuple[str, int]]:
+def viewer(
+    vehicle: Vehicle, more: Sequence[Address] = (), scenario: str | None = None
+) -> Iterator[tuple[str, int]]:
     """Run a viewer; gives the host and port that it hears the truth on.
 
-    more: other links that it is to listen on. A viewer that ends, or never starts, is nobody's concern.
+    more: other links that it is to listen on. scenario: name or file of what is flown.
+    A viewer that ends, or never starts, is nobody's concern.
     """
     [port] = free_ports(1)
     with tempfile.TemporaryDirectory() as folder:
         write_vehicle(Path(folder), vehicle)
         command = [sys.executable, "-m", "sitl", "view", f"udpin:127.0.0.1:{port}", *map(str, more)]
         command += ["--vehicle", str(Path(folder) / VEHICLE_NAME), "--until-eof"]
+        if scenario is not None:
+            command += ["--scenario", scenario]
         child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
         try:
             yield "127.0.0.1", port

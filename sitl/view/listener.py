@@ -14,6 +14,7 @@ from typing import Any
 from pymavlink.dialects.v20 import common as mavlink
 from pymavlink.mavutil import mode_string_v10
 
+from controller.ground.flight.px4_modes import Mode, find_mode
 from controller.ground.missions.transfer import FENCE, MISSION, RALLY
 from sitl.view.plan import plan_of
 from sitl.view.plan_download import PlanDownload
@@ -167,7 +168,7 @@ class Listener:
         if frame.system != self._vehicle_system:
             return
         armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
-        self.view = replace(self.view, armed=armed, mode=mode_string_v10(message))
+        self.view = replace(self.view, armed=armed, mode=mode_name(message))
         if frame.system not in self._asked:
             self._asked.add(frame.system)
             self._out += [self._request(frame.system, wanted) for wanted in _WANTED]
@@ -244,7 +245,7 @@ class Listener:
             self.view = replace(self.view, tension=message.value)
         elif message.name == SCENARIO_TIME and math.isfinite(message.value):
             self._first_usec = 1000 * message.time_boot_ms - round(message.value * 1e6)
-            self.view = replace(self.view, time_s=message.value)
+            self.view = replace(self.view, time_s=message.value, of_scenario=True)
 
     def _on_array(self, frame: Frame, message: Any, now: float) -> None:
         name = message.name.rstrip("\0") if isinstance(message.name, str) else ""
@@ -268,6 +269,15 @@ class Listener:
 
     def _on_wind(self, frame: Frame, message: Any, now: float) -> None:
         self.view = replace(self.view, wind=enu_to_ned((message.wind_x, message.wind_y, message.wind_z)))
+
+
+def mode_name(heartbeat: Any) -> str:
+    """The mode as a ground station calls it."""
+    if heartbeat.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+        mode = find_mode(heartbeat.custom_mode >> 16 & 0xFF, heartbeat.custom_mode >> 24)
+        if isinstance(mode, Mode):
+            return mode.title
+    return str(mode_string_v10(heartbeat))
 
 
 _HANDLERS = {

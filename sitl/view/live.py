@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from sitl.view.listener import Listener
-from sitl.view.panel import Panel
-from sitl.view.scene import Scene
-from sitl.view.steering import Steering
+from sitl.view.page.panel import Panel
+from sitl.view.page.scene import Scene
+from sitl.view.page.steering import Steering
+from sitl.view.view import View
+from sitl.view.way import Way
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from sitl_bridge.process import StopRequest
@@ -22,22 +25,22 @@ MOST_DATAGRAMS = 200
 
 
 def watch(
-    addresses: Sequence[Address], vehicle: Vehicle, server: Any, stop: StopRequest, path: Any = None
+    addresses: Sequence[Address], vehicle: Vehicle, server: Any, stop: StopRequest, way: Way | None = None
 ) -> None:
     """Show what speaks on the links until asked to stop. Raises OSError where a link can't be opened.
 
-    path: (n, 3) m, the reference's way; None: there is none.
+    way: of the reference that is flown; None: it is not known.
     """
     home = vehicle.home
     listener = Listener(LocalOrigin(home.latitude, home.longitude, home.altitude), vehicle.node_count)
     scene, steering, panel = Scene(server, vehicle), Steering(server.gui), Panel(server)
-    if path is not None:
-        scene.show_path(path)
+    if way is not None:
+        scene.show_path(way.points)
     links: list[Link] = []
     try:
         for address in addresses:
             links.append(open_link(address, lambda text: None))
-        _loop(links, listener, scene, panel, steering, stop)
+        _loop(links, listener, scene, panel, steering, way, stop)
     finally:
         for link in links:
             link.close()
@@ -49,6 +52,7 @@ def _loop(
     scene: Scene,
     panel: Panel,
     steering: Steering,
+    way: Way | None,
     stop: StopRequest,
 ) -> None:
     next_picture = time.monotonic()
@@ -69,8 +73,8 @@ def _loop(
             next_picture = time.monotonic() + FRAME_INTERVAL
             if listener.view is not shown:
                 shown = listener.view
-                scene.show(shown)
-            panel.show(listener.view, now)
+                scene.show(_with_set_point(shown, way))
+            panel.show(_with_set_point(listener.view, way), now)
             steering.show(listener.view)
 
 
@@ -82,3 +86,10 @@ def _drain(link: Link, listener: Listener, until: float) -> None:
             return
         listener.receive(datagram, time.monotonic())
         until = 0.0
+
+
+def _with_set_point(view: View, way: Way | None) -> View:
+    """With the reference's set-point, unless the vehicle tells its own."""
+    if way is None or view.set_point is not None or not view.of_scenario:
+        return view
+    return replace(view, set_point=way.set_point(view.time_s))

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sitl.view.panel import Panel
-from sitl.view.scene import Scene
+from sitl.view.page.panel import Panel, aim
+from sitl.view.page.scene import Scene
 from sitl.view.view import View
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle
@@ -44,10 +44,9 @@ def export_html(views: list[View], vehicle: Vehicle, server: Any, file: Path) ->
     """Write the flight as one self-contained page with a time line."""
     scene = Scene(server, vehicle)
     scene.show_path(_set_points(views))
-    first = views[0].load or views[0].vehicle or (0.0, 0.0, 0.0)
-    distance = 6.0 + 1.5 * (views[0].cable_length or 0.0)
-    server.initial_camera.position = (first[0] - distance, first[1] - distance, first[2] + 0.5 * distance)
-    server.initial_camera.look_at = first
+    aimed = aim("chase", views[0])
+    if aimed is not None:
+        server.initial_camera.position, server.initial_camera.look_at = aimed
     scene.show(views[0])
     serializer = server.get_scene_serializer()
     for before, view in itertools.pairwise(views):

@@ -35,6 +35,8 @@ class ViewOptions:
     vehicle: str | None = None
     """Name or file of the description that says what it looks like; None: the flight's own, or iris."""
     overrides: Sequence[str] = ()
+    scenario: str | None = None
+    """Name or file of the scenario whose reference is drawn."""
     export: Path | None = None
     """Write the page here, serve nothing."""
     host: str = "127.0.0.1"
@@ -48,6 +50,12 @@ class ViewOptions:
 def run(options: ViewOptions, stop: StopRequest) -> None:
     """Show until asked to stop. Raises DescriptionError, RecordingError, OSError."""
     views, vehicle = _what_to_show(options)
+    way = None
+    if options.scenario is not None:
+        from sitl.flights.scenario import load_scenario
+        from sitl.view.way import Way
+
+        way = Way(load_scenario(options.scenario), vehicle)
     server = _server(options)
     try:
         if options.export is not None:
@@ -63,7 +71,7 @@ def run(options: ViewOptions, stop: StopRequest) -> None:
         else:
             from sitl.view.live import watch
 
-            watch(options.addresses, vehicle, server, stop)
+            watch(options.addresses, vehicle, server, stop, way)
     finally:
         with contextlib.redirect_stdout(io.StringIO()):
             server.stop()

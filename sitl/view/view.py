@@ -16,7 +16,9 @@ class View:
     """What is known; None where nothing has said it."""
 
     time_s: float = 0.0
-    """Since the scenario began, where that is known, else since the first message."""
+    """Since the scenario began, or since the first message."""
+    of_scenario: bool = False
+    """Whether the time is the scenario's."""
     vehicle: Triple | None = None
     """m."""
     attitude: Quaternion = UPRIGHT

@@ -76,7 +76,7 @@ def test_it_asks_an_autopilot_once_for_what_moves() -> None:
     asked = [m for m in sent if m.get_type() == "COMMAND_LONG"]
     assert {(m.command, m.target_system) for m in asked} == {(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 1)}
     assert {int(m.param1) for m in asked} == {31, 33}
-    assert listener.view.mode == "LOITER"
+    assert listener.view.mode == "Hold"
     assert listener.view.armed
     assert not listener.to_send(3.1)
 

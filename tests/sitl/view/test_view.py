@@ -10,11 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from sitl.flights.scenario import Circle, load_scenario
 from sitl.recording.recording import RecordingError, read_recording
-from sitl.view.panel import aim, numbers
+from sitl.view.page.cable import along, colour_of, load_shares
+from sitl.view.page.panel import aim, numbers, plotted
 from sitl.view.replay import views_of_recording, views_of_tlog
-from sitl.view.scene import load_shares
 from sitl.view.view import View
+from sitl.view.way import Way
+from sitl_bridge.frames import rotate
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.sitl.export.flights import leave_flight
 
@@ -67,11 +70,11 @@ def test_numbers_leave_out_what_is_not_known() -> None:
 @pytest.mark.parametrize("camera", ["chase", "top", "load"])
 def test_a_camera_looks_at_what_flies_from_elsewhere(camera: str) -> None:
     view = View(vehicle=(1.0, 2.0, 3.0), load=(1.0, 2.0, 1.5))
-    aimed = aim(camera, view, 5.0)
+    aimed = aim(camera, view)
     assert aimed is not None
     position, target = aimed
     assert math.dist(position, target) > 0.1
-    assert aim("free", view, 5.0) is None
+    assert aim("free", view) is None
 
 
 def test_each_piece_of_a_chain_pulls_as_its_spring_does() -> None:
@@ -84,3 +87,41 @@ def test_each_piece_of_a_chain_pulls_as_its_spring_does() -> None:
     told = load_shares(vehicle, pulled + 3.0, points)
     assert told == pytest.approx([(pulled + 3.0) / weight, 3.0 / weight])
     assert load_shares(vehicle, 7.0, points[[0, 2]]) == pytest.approx([7.0 / weight])
+
+
+@pytest.mark.parametrize(
+    "direction", [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8), (0.48, 0.64, 0.6)]
+)
+def test_a_rod_lies_along_its_piece(direction: tuple[float, float, float]) -> None:
+    assert rotate(along(direction), (0.0, 0.0, 1.0)) == pytest.approx(direction, abs=1e-12)
+
+
+def test_a_cable_is_grey_then_green_then_red() -> None:
+    slack, green, red = colour_of(0.0), colour_of(1.0), colour_of(2.5)
+    assert len(set(slack)) == 1
+    assert green[1] > 5 * green[0]
+    assert red[0] > 5 * red[1]
+
+
+def test_the_way_of_a_circle_is_one_round_of_it_and_the_set_point_is_on_it() -> None:
+    scenario = load_scenario("circle")
+    way = Way(scenario, load_vehicle("paper"))
+    assert isinstance(scenario.reference, Circle)
+    centre = np.array(scenario.reference.centre)
+    assert np.linalg.norm(way.points - centre, axis=1) == pytest.approx(scenario.reference.radius)
+    assert way.points[0] == pytest.approx(way.points[-1])
+    assert way.set_point(0.0) == pytest.approx(way.points[0])
+    assert way.set_point(-5.0) == way.set_point(0.0)
+
+
+def test_ground_control_has_no_way_and_a_set_point_a_straight_one() -> None:
+    iris = load_vehicle("iris")
+    assert len(Way(load_scenario("hold"), iris).points) == 0
+    assert Way(load_scenario("hold"), iris).set_point(1.0) is None
+    assert len(Way(load_scenario("setpoint"), iris).points) == 2
+
+
+def test_what_is_not_known_is_not_plotted() -> None:
+    known = [not math.isnan(number) for number in plotted(View(tension=3.0, vehicle=(0.0, 0.0, 1.0)))]
+    assert known == [True, False, True, False]
+    assert plotted(View(battery=0.5))[3] == 50.0

@@ -11,7 +11,9 @@ import numpy as np
 from sitl.view.view import View
 
 CAMERAS = ("free", "chase", "top", "load")
-PLOTTED = ("swing [deg]", "tilt [deg]", "cable length [m]")
+PLOTTED = ("tension [N]", "swing [°]", "tilt [°]", "battery [%]")
+NEAREST, DISTANCE_SHARE = 2.5, 0.9
+"""m from which a vehicle without a load is looked at, and how much more (m) for each metre of cable."""
 HISTORY_S = 30.0
 SLOW_INTERVAL = 0.2
 """s between two refreshes of numbers and plots."""
@@ -27,6 +29,7 @@ class Panel:
         gui = server.gui
         self.camera = gui.add_dropdown("Camera", CAMERAS, initial_value="chase")
         self._numbers = gui.add_markdown("waiting for a vehicle …")
+        self._texts = gui.add_markdown("", visible=False)
         self._history: deque[tuple[float, ...]] = deque()
         empty = np.zeros(2)
         self._plots = [
@@ -35,11 +38,12 @@ class Panel:
                 (uplot.Series(label="t"), uplot.Series(label=label, stroke="#2f6fd0", width=2)),
                 title=label,
                 scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
-                aspect=2.4,
+                legend=uplot.Legend(show=False),
+                aspect=3.0,
+                visible=False,
             )
             for label in PLOTTED
         ]
-        self._texts = gui.add_markdown("")
         self._next = -math.inf
 
     def show(self, view: View, now: float) -> None:
@@ -50,43 +54,51 @@ class Panel:
         self._next = now + SLOW_INTERVAL
         self._numbers.content = numbers(view)
         self._texts.content = "\n".join(f"- {text}" for text in reversed(view.texts))
+        self._texts.visible = bool(view.texts)
         self._plot(view)
 
     def _plot(self, view: View) -> None:
-        swing, length = view.swing, view.cable_length
-        if swing is None or length is None:
-            return
+        """The last half minute of what is known."""
         history = self._history
         if history and view.time_s < history[-1][0]:
             history.clear()
         if history and view.time_s == history[-1][0]:
             return
-        history.append((view.time_s, math.degrees(swing), math.degrees(view.tilt), length))
+        history.append((view.time_s, *plotted(view)))
         while history[0][0] < view.time_s - HISTORY_S:
             history.popleft()
-        if len(history) > 1:
-            columns = np.array(history).T
-            for plot, column in zip(self._plots, columns[1:], strict=True):
-                plot.data = (columns[0], column)
+        times, *columns = np.array(history).T
+        for plot, column in zip(self._plots, columns, strict=True):
+            known = np.isfinite(column)
+            plot.visible = bool(known.sum() > 1)
+            if plot.visible:
+                plot.data = (times[known], column[known])
 
     def _aim(self, view: View) -> None:
-        if self.camera.value == "free" or view.vehicle is None:
+        aimed = aim(self.camera.value, view)
+        if aimed is None:
             return
-        target = view.load or view.vehicle
-        distance = 6.0 + 1.5 * (view.cable_length or 0.0)
         for client in self._server.get_clients().values():
-            position, look_at = aim(self.camera.value, view, distance) or (None, target)
-            if position is not None:
-                client.camera.position, client.camera.look_at = position, look_at
+            client.camera.position, client.camera.look_at = aimed
 
 
-def aim(
-    camera: str, view: View, distance: float
-) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
+def plotted(view: View) -> tuple[float, ...]:
+    """The numbers of `PLOTTED`, NaN where one is not known."""
+    nan = math.nan
+    return (
+        nan if view.tension is None else view.tension,
+        nan if view.swing is None else math.degrees(view.swing),
+        nan if view.vehicle is None else math.degrees(view.tilt),
+        nan if view.battery is None else 100.0 * view.battery,
+    )
+
+
+def aim(camera: str, view: View) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
     """Where a camera is and what it looks at, m; None where the person moves it."""
     if view.vehicle is None or camera == "free":
         return None
     x, y, z = view.vehicle
+    distance = NEAREST + DISTANCE_SHARE * (view.cable_length or 0.0)
     target = view.load or view.vehicle
     middle = tuple(0.5 * (a + b) for a, b in zip(view.vehicle, target, strict=True))
     if camera == "top":
@@ -98,7 +110,7 @@ def aim(
 
 def numbers(view: View) -> str:
     """The table of numbers, as Markdown."""
-    rows = [("time", f"{view.time_s:.1f} s")]
+    rows = [("time", f"{view.time_s:.1f} s" + (", paused" if view.speed == 0.0 else ""))]
     if view.mode is not None:
         rows.append(("mode", f"{view.mode}, {'armed' if view.armed else 'disarmed'}"))
     for name, at in (("vehicle", view.vehicle), ("load", view.load), ("set-point", view.set_point)):
@@ -110,7 +122,9 @@ def numbers(view: View) -> str:
     if view.cable_length is not None:
         rows.append(("cable", f"{view.cable_length:.2f} m"))
     if view.tension is not None:
-        rows.append(("tension", f"{view.tension:.1f} N"))
+        rows.append(("tension", "no cable" if math.isnan(view.tension) else f"{view.tension:.1f} N"))
+    if view.wind is not None and math.hypot(*view.wind) >= 0.05:
+        rows.append(("wind", f"{math.hypot(*view.wind):.1f} m/s"))
     if view.battery is not None:
         rows.append(("battery", f"{100 * view.battery:.0f} %"))
     return "| | |\n|---|---|\n" + "\n".join(f"| {name} | {value} |" for name, value in rows)

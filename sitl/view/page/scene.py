@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
 import math
 from collections import deque
 from typing import Any
@@ -11,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.export.shapes import disc_diameter, load_radius
-from sitl.view.plan_scene import PlanScene
-from sitl.view.view import View
-from sitl_bridge.frames import Quaternion, Triple
-from sitl_bridge.vehicle.cable_law import linear_cable
+from sitl.view.page.cable import CableScene
+from sitl.view.page.plans import PlanScene
+from sitl.view.view import UPRIGHT, View
+from sitl_bridge.frames import Quaternion, Triple, rotate
 from sitl_bridge.vehicle.description import Vehicle
 
 Colour = tuple[int, int, int]
@@ -22,10 +21,16 @@ _ARM: Colour = (55, 60, 70)
 _DISC: Colour = (70, 130, 220)
 _BLADE: Colour = (30, 40, 60)
 _LOAD: Colour = (235, 140, 40)
-_SLACK: Colour = (150, 150, 150)
+_CONTACT: Colour = (200, 60, 40)
 _SET_POINT: Colour = (60, 170, 90)
 _TRAILS: dict[str, Colour] = {"vehicle": (110, 150, 230), "load": (240, 170, 90)}
 TRAIL_POINTS = 300
+TOUCH = 0.003
+"""m above the ground within which something counts as touching it."""
+LEAST_WIND = 0.1
+"""m/s: less is not drawn."""
+BACK_IN_TIME = 0.5
+"""s: a moment so much earlier than the last begins the trails anew."""
 TRAIL_SPACING = 0.05
 """m between two points of a trail."""
 BLADE_SPEED = 12.0
@@ -43,7 +48,19 @@ class Scene:
         self._trails = {body: deque[Triple](maxlen=TRAIL_POINTS) for body in _TRAILS}
         self._lines: dict[str, Any] = {}
         self._draw_ground()
+        self._cable = CableScene(server.scene, vehicle)
         self._plan = PlanScene(server.scene, vehicle.ground.height if vehicle.ground is not None else 0.0)
+        self._contacts = [
+            self._scene.add_cylinder(
+                f"/contact_{index}",
+                radius=0.08,
+                height=0.01,
+                color=_CONTACT,
+                visible=False,
+                cast_shadow=False,
+            )
+            for index in range(len(contact_points(vehicle, UPRIGHT)))
+        ]
         self._body = self._scene.add_frame("/vehicle", show_axes=False, visible=False)
         self._blades = [self._draw_rotor(index) for index in range(len(vehicle.rotors))]
         radius = load_radius(vehicle)
@@ -54,35 +71,33 @@ class Scene:
 
     def show(self, view: View) -> None:
         """Draw a moment; what is not known is not drawn."""
+        if self._last_time is not None and view.time_s < self._last_time - BACK_IN_TIME:
+            for points in self._trails.values():
+                points.clear()
         self._show_vehicle(view)
+        self._show_contacts(view)
         if view.load is not None:
             self._load.position, self._load.visible = view.load, True
-        self._show_cable(view)
+        self._cable.show(view)
         self._plan.show(view.plan)
         if view.set_point is not None:
             self._target.position, self._target.visible = view.set_point, True
         for body, at in (("vehicle", view.vehicle), ("load", view.load)):
             if at is not None:
                 self._trail(body, at)
-        if view.wind is not None and view.vehicle is not None:
+        if view.wind is not None and view.vehicle is not None and math.hypot(*view.wind) > LEAST_WIND:
             self._show_wind(view.vehicle, view.wind)
 
     def show_path(self, points: NDArray[np.float64]) -> None:
         """Draw the reference's way: points (n, 3), m, world."""
         self._draw_line("/path", points, _SET_POINT, 1.0)
 
-    def _draw_line(
-        self, name: str, points: NDArray[np.float64], colour: Colour | list[Colour], thickness: float
-    ) -> None:
-        """A line through points (n, 3), m; an older one of that name is changed.
-
-        colour: of the line, or of each of its n - 1 pieces.
-        """
+    def _draw_line(self, name: str, points: NDArray[np.float64], colour: Colour, thickness: float) -> None:
+        """A line through points (n, 3), m; an older one of that name is changed."""
         if len(points) < 2:
             return
         segments = np.stack((points[:-1], points[1:]), axis=1).astype(np.float32)
-        pieces = np.array(colour, np.uint8).reshape(-1, 1, 3)
-        colours = np.broadcast_to(pieces, segments.shape)
+        colours = np.broadcast_to(np.array(colour, np.uint8), segments.shape)
         line = self._lines.get(name)
         if line is None:
             self._lines[name] = self._scene.add_line_segments(
@@ -145,18 +160,21 @@ class Scene:
             self._angles[index] += sign * BLADE_SPEED * speed * passed
             blade.wxyz = _about_z(float(self._angles[index]))
 
-    def _show_cable(self, view: View) -> None:
-        """A line from vehicle to load, through a chain's nodes; none once it joins them no more."""
-        if view.vehicle is None or view.load is None:
+    def _show_contacts(self, view: View) -> None:
+        """Where legs and load touch the ground."""
+        ground = self._vehicle.ground
+        if ground is None or view.vehicle is None:
             return
-        broken = view.tension is not None and math.isnan(view.tension)
-        if "/cable" in self._lines:
-            self._lines["/cable"].visible = not broken
-        if broken:
-            return
-        points = np.array([view.vehicle, *view.nodes, view.load])
-        colours = [_colour(share) for share in load_shares(self._vehicle, view.tension, points)]
-        self._draw_line("/cable", points, colours, 3.0)
+        places = [
+            tuple(map(sum, zip(view.vehicle, leg, strict=True)))
+            for leg in contact_points(self._vehicle, view.attitude)[:-1]
+        ]
+        low = view.load or (0.0, 0.0, math.inf)
+        places.append((low[0], low[1], low[2] - self._vehicle.load.radius))
+        for mark, (x, y, z) in zip(self._contacts, places, strict=True):
+            mark.visible = z < ground.height + TOUCH
+            if mark.visible:
+                mark.position = (x, y, ground.height + 0.01)
 
     def _trail(self, body: str, at: Triple) -> None:
         points = self._trails[body]
@@ -170,29 +188,9 @@ class Scene:
         self._scene.add_arrows("/wind", np.array([[at, head]]), (80, 160, 200))
 
 
-def load_shares(vehicle: Vehicle, tension: float | None, points: NDArray[np.float64]) -> list[float]:
-    """Tension over the load's weight in each piece of a cable through points (n, 3), m.
-
-    A chain's tension is told at its top. The other pieces differ from the topmost in length by what their
-    springs pull more or less. Where no tension is told, the springs pull as described.
-    """
-    cable, pieces = linear_cable(vehicle), len(points) - 1
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    if tension is not None and (pieces == 1 or tension > 0.0):
-        tensions = tension + cable.stiffness * pieces * (lengths - lengths[0])
-    else:
-        tensions = cable.stiffness * (pieces * lengths - cable.rest_length)
-    tensions = np.maximum(0.0, tensions)
-    shares: list[float] = (tensions / (vehicle.load.mass * vehicle.gravity)).tolist()
-    return shares
-
-
-def _colour(share: float) -> Colour:
-    """Grey while slack, green up to the load's weight, red at twice that."""
-    if share <= 0.0:
-        return _SLACK
-    red, green, blue = colorsys.hsv_to_rgb((1.0 - min(1.0, max(0.0, share - 1.0))) / 3.0, 0.85, 0.8)
-    return (round(255 * red), round(255 * green), round(255 * blue))
+def contact_points(vehicle: Vehicle, attitude: Quaternion) -> list[Triple]:
+    """Ends of the legs from the centre of mass, m, world; last, for the load, the origin."""
+    return [*(rotate(attitude, leg) for leg in vehicle.airframe.legs), (0.0, 0.0, 0.0)]
 
 
 def _about_z(angle: float) -> Quaternion:
