@@ -20,7 +20,7 @@ from sitl.flights.free_ports import free_ports
 
 START_PATIENCE = 120.0
 """s without another line from the vehicle; a first start says each part that it compiles"""
-STOP_PATIENCE = 20.0
+STOP_PATIENCE = 120.0
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from pymavlink.dialects.v20 import common
 
 from sitl_bridge.mavlink.framing import Packer, split
 from sitl_bridge.mavlink.links import LONGEST_WAIT, Address, TcpLink, open_link, parse_address
+from tests.patience import PATIENCE
 
-PATIENCE = 20.0
 packer = Packer(1, 191)
 
 

@@ -11,8 +11,7 @@ import pytest
 
 from sitl_bridge.mavlink import links
 from sitl_bridge.mavlink.links import Address, UdpLink
-
-PATIENCE = 20.0
+from tests.patience import PATIENCE
 
 
 @pytest.fixture(params=["coarse", "punctual", "one socket on a port"])

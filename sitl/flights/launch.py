@@ -16,7 +16,7 @@ from typing import IO, Any
 
 from sitl_bridge.process import FLIGHT_OVER, StopRequest
 
-PATIENCE = 10.0
+PATIENCE = 60.0
 """How long a process may take to stop before it is killed, s."""
 POLL_INTERVAL = 0.1
 

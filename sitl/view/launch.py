@@ -16,7 +16,7 @@ from sitl_bridge.mavlink.links import Address
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
-PATIENCE = 5.0
+PATIENCE = 20.0
 """How long the viewer may take to stop before it is killed, s."""
 
 

@@ -10,6 +10,7 @@ from types import ModuleType
 import pytest
 
 from sitl_bridge.compiled import machine_code
+from tests.patience import PATIENCE
 
 NAME = "native_sample"
 SOURCE = '''
@@ -70,7 +71,7 @@ class Sample:
         self.source = folder / f"{NAME}.py"
         self.source.write_text(SOURCE)
         two = [self.start() for _ in range(2)]
-        self.outcomes = [(*process.communicate(timeout=120), process.returncode) for process in two]
+        self.outcomes = [(*process.communicate(timeout=PATIENCE), process.returncode) for process in two]
 
     def start(self, *arguments: str, **variables: str) -> subprocess.Popen[str]:
         """A process that calls what is compiled."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.compiled.sample import SOURCE, Sample, code_files, kernel_files
+from tests.patience import PATIENCE
 
 CALLERS_OF_WAVE = ["alone", "apply", "wave"]
 ALL = ["alone", "apply", "element", "ratio", "wave"]
@@ -23,7 +24,7 @@ class Home:
     def compile(self) -> str:
         """Compile what is missing; returns what the sample then gives."""
         process = self._sample.start(XDG_CACHE_HOME=str(self.home))
-        out, err = process.communicate(timeout=120)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, err
         return out
 

@@ -8,6 +8,7 @@ import pytest
 from sitl_bridge.compiled import cache as caching
 from sitl_bridge.compiled import compile_missing, load, missing
 from tests.compiled.sample import NAME, SOURCE, Sample, code_files, fresh
+from tests.patience import PATIENCE
 
 ALLOCATES = """
 import numpy as np
@@ -61,7 +62,7 @@ def test_two_processes_compile_at_once_without_compiler_or_llvm_in_either(sample
 def test_a_computer_without_linker_keeps_the_object_file(sample: Sample, tmp_path: Path) -> None:
     home = tmp_path / "home"
     runs = [sample.start("without linker", PATH=str(tmp_path), XDG_CACHE_HOME=str(home)) for _ in range(2)]
-    outs = [run.communicate(timeout=120) for run in runs]
+    outs = [run.communicate(timeout=PATIENCE) for run in runs]
     assert [run.returncode for run in runs] == [0, 0], outs
     assert {out for out, _ in outs} == {sample.outcomes[0][0]}
     assert [file.suffix for file in code_files(home / "sitl-bridge")] == [".o"]
@@ -73,7 +74,7 @@ def test_it_works_where_nothing_can_be_kept(sample: Sample, tmp_path: Path) -> N
     temporary.mkdir()
     (temporary / f"sitl-bridge-{caching.os.getuid()}").touch()
     run = sample.start(XDG_CACHE_HOME=str(tmp_path / "file"), TMPDIR=str(temporary))
-    out, err = run.communicate(timeout=120)
+    out, err = run.communicate(timeout=PATIENCE)
     assert run.returncode == 0, err
     assert out == sample.outcomes[0][0]
     assert err.endswith(f"no place to keep the compiled {NAME}: each start compiles it\n")
@@ -151,6 +152,6 @@ def test_a_killed_process_leaves_what_its_compiler_is_about_to_finish(sample: Sa
     run.kill()
     run.wait()
     again = sample.start(XDG_CACHE_HOME=str(home))  # waits for the other's compiler, which has the lock
-    out, err = again.communicate(timeout=120)
+    out, err = again.communicate(timeout=PATIENCE)
     assert (again.returncode, out) == (0, sample.outcomes[0][0]), err
     assert len(code_files(home / "sitl-bridge")) == 1

@@ -14,9 +14,8 @@ from typing import Any
 from pymavlink.dialects.v20 import common
 
 from sitl.flights.free_ports import free_ports
+from tests.patience import PATIENCE
 
-PATIENCE = 120.0
-"""Generous: two shared cores, perhaps with a compiler at work, s."""
 LOCKSTEP = common.HIL_ACTUATOR_CONTROLS_FLAGS_LOCKSTEP
 ARMED = common.MAV_MODE_FLAG_SAFETY_ARMED
 STATE_INTERVAL_US = 5000

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from tests.conformance.px4 import PATIENCE, Plant, Px4
+from tests.conformance.px4 import Plant, Px4
+from tests.patience import PATIENCE
 
 HOVER_THRUST = (1.5 + 0.3) * 9.81  # N, iris with its load
 LARGEST_THRUST = 4 * 5.84e-6 * 1100.0**2  # N

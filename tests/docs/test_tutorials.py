@@ -19,6 +19,7 @@ from nbclient import NotebookClient
 
 from tests.docs.notebooks import NOTEBOOKS, notebook
 from tests.docs.pages import TUTORIALS, blocks, commands
+from tests.patience import LONG_PATIENCE
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
@@ -30,7 +31,7 @@ def test_the_notebook_is_the_page(name: str) -> None:
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_the_notebook_runs(name: str, tmp_path: Path) -> None:
     run = nbformat.read(TUTORIALS / f"{name}.ipynb", as_version=4)
-    NotebookClient(run, timeout=200, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    NotebookClient(run, timeout=LONG_PATIENCE, resources={"metadata": {"path": str(tmp_path)}}).execute()
     assert sum(cell.cell_type == "code" for cell in run.cells) >= 2
     assert list(tmp_path.glob("*.png"))
 

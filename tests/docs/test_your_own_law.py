@@ -13,6 +13,7 @@ import pytest
 
 from controller.own_law.interface import Estimate, Reference
 from tests.docs.pages import DOCS, blocks, commands
+from tests.patience import LONG_PATIENCE
 
 PAGE = DOCS / "your-own-law.md"
 
@@ -23,7 +24,9 @@ def test_the_law_of_the_page_settles_and_leaves_its_picture(tmp_path: Path) -> N
     flight = shlex.split(commands(PAGE)[0])
     assert flight[:2] == ["sitl", "fly"]
     command = [sys.executable, "-m", "sitl", *flight[1:]]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=200)
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=LONG_PATIENCE
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "own law, a tick" in done.stdout
     assert (tmp_path / "my-flight/flight.png").exists()

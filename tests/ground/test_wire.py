@@ -22,6 +22,7 @@ from controller.ground.link.packing import (
     packed,
 )
 from sitl_bridge.mavlink.framing import split
+from tests.patience import PATIENCE
 
 
 def _random_message(number: int, seed: int) -> Any:
@@ -66,7 +67,7 @@ before = set(sys.modules)
 assert frame_v1(bytes(9), 0, 50, 0, 1, 1)
 assert set(sys.modules) == before, set(sys.modules) - before
 """
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=PATIENCE)
 
 
 def test_mavlink_1_cannot_say_everything() -> None:

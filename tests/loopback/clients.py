@@ -12,7 +12,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
-from tests.loopback.patience import PATIENCE
+from tests.patience import PATIENCE
 
 
 class Vehicle:
@@ -159,7 +159,7 @@ class MavProxy:
         """End it."""
         self._process.terminate()
         try:
-            self._process.wait(5)
+            self._process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

@@ -16,9 +16,7 @@ from typing import Any
 import pytest
 
 from sitl.flights.free_ports import free_ports
-
-PATIENCE = 120.0
-"""Generous: two shared cores, perhaps with a compiler at work, s."""
+from tests.patience import PATIENCE
 
 
 class Process:
@@ -37,6 +35,7 @@ class Process:
             preexec_fn=child_setup,
         )
         self._errors = b""
+        self._deadline = 0.0
         assert self.popen.stderr is not None
         os.set_blocking(self.popen.stderr.fileno(), False)
 
@@ -44,15 +43,22 @@ class Process:
     def errors(self) -> str:
         """What it has said on standard error so far."""
         assert self.popen.stderr is not None
-        self._errors += self.popen.stderr.read() or b""
+        said = self.popen.stderr.read() or b""
+        if said:
+            self._be_patient()
+        self._errors += said
         return self._errors.decode()
+
+    def _be_patient(self) -> None:
+        """Wait on: a flight on a busy machine may take long, but it says how it goes."""
+        self._deadline = time.monotonic() + PATIENCE
 
     def wait_for(self, text: str) -> None:
         """Wait until it has said something."""
-        deadline = time.monotonic() + PATIENCE
+        self._be_patient()
         while text not in self.errors:
             assert self.popen.poll() is None, f"ended before it said {text!r}:\n{self.errors}"
-            assert time.monotonic() < deadline, f"never said {text!r}:\n{self.errors}"
+            assert time.monotonic() < self._deadline, f"never said {text!r}:\n{self.errors}"
             assert self.popen.stderr is not None
             select.select([self.popen.stderr], [], [], 0.2)
 
@@ -60,7 +66,7 @@ class Process:
         """Wait for its end: exit code, standard output, standard error."""
         assert self.popen.stdout is not None
         output = b""
-        deadline = time.monotonic() + PATIENCE
+        self._be_patient()
         while True:
             readable, _, _ = select.select([self.popen.stdout], [], [], 0.2)
             if readable:
@@ -68,8 +74,9 @@ class Process:
                 if not data:
                     break
                 output += data
+                self._be_patient()
             _ = self.errors
-            assert time.monotonic() < deadline, f"does not end:\n{self.errors}"
+            assert time.monotonic() < self._deadline, f"does not end:\n{self.errors}"
         code = self.popen.wait(PATIENCE)
         return code, output.decode(), self.errors
 

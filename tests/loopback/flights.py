@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
-from tests.loopback.patience import LONG_PATIENCE
+from tests.patience import LONG_PATIENCE
 
 METRES_PER_DEGREE = 111_180.0
 BRISK = ("--clock", "lockstep", "--speed", "4")

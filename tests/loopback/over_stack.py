@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import select
 import socket
@@ -15,6 +16,8 @@ from sitl.flights.free_ports import free_ports
 from tests.loopback.conftest import Process
 
 IRIS = ("--vehicle", "iris", "--sensors", "rtk")
+PATIENT = {"COM_OF_LOSS_T": 3.0, "COM_HIL_LOSS_T": 10.0}
+"""s: on a busy machine a process that gets no turn for a second has not lost its link"""
 STEP = """vehicle = "iris"
 duration = 12.0
 [reference]
@@ -32,6 +35,8 @@ class StandIn:
         self._start = start
         self.step = folder / "step.toml"
         self.step.write_text(STEP)
+        self._parameters = folder / "parameters.json"
+        self._parameters.write_text(json.dumps(PATIENT))
 
     def start_plant(self, *arguments: str) -> Process:
         """The plant, as `fly` would launch it."""
@@ -41,7 +46,7 @@ class StandIn:
     def start_stack(self) -> Process:
         """Our autopilot under ground control."""
         links = ("--gcs", f"{self.gcs}:{self.gcs_peer}", "--onboard", f"{self.onboard}:{self.onboard_peer}")
-        hil = ("--hil", f"tcpout:127.0.0.1:{self.hil}")
+        hil = ("--hil", f"tcpout:127.0.0.1:{self.hil}", "--parameters", str(self._parameters))
         return self._start("controller", "--scenario", "hold", *IRIS, *hil, *links)
 
     @property

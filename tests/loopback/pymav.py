@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import queue
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +13,7 @@ from typing import Any
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common as mavlink
 
-from tests.loopback.patience import LONG_PATIENCE, PATIENCE
+from tests.patience import LONG_PATIENCE, PATIENCE
 
 os.environ["MAVLINK20"] = "1"  # else pymavlink begins with MAVLink 1, and is answered in that
 mavutil.set_dialect("common")
@@ -21,32 +23,59 @@ HOLD, LAND, OFFBOARD = (4, 3), (4, 6), (6, 0)
 
 
 class PyMav:
-    """One connection; it beats whenever it waits, and keeps everything that it hears."""
+    """One connection, which keeps everything that it hears.
+
+    A thread beats and empties the socket all the time, as those of real ground stations do, whatever the test
+    waits for meanwhile. The socket's buffer holds two seconds of a vehicle's telemetry: once it is full, the
+    kernel drops what comes next, an answer too. Ten seconds without a HEARTBEAT are a lost station.
+    """
 
     def __init__(self, connection: str, system: int = 245, component: int = 190) -> None:
         self.link = mavutil.mavlink_connection(connection, source_system=system, source_component=component)
         self.heard: list[Any] = []
-        self._beat = 0.0
         self._texts: list[str] = []
+        self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._closing = False
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        beat = 0.0
+        while not self._closing:
+            if time.monotonic() >= beat:
+                beat = time.monotonic() + 0.5
+                self.link.mav.heartbeat_send(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0)
+            message = self.link.recv_match(blocking=True, timeout=0.05)
+            if message is not None:
+                self._arrived.put(message)
 
     def close(self) -> None:
         """Free the port."""
+        self._closing = True
+        self._reader.join()
         self.link.close()
 
     def poll(self) -> Any | None:
-        """Beat if it is time to; the next message, if one comes soon."""
-        if time.monotonic() >= self._beat:
-            self._beat = time.monotonic() + 0.5
-            self.link.mav.heartbeat_send(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 0)
-        message = self.link.recv_match(blocking=True, timeout=0.05)
-        if message is not None:
-            self.heard.append(message)
-            if message.get_type() == "STATUSTEXT":
-                if message.id and message.chunk_seq and self._texts:
-                    self._texts[-1] += message.text
-                else:
-                    self._texts.append(message.text)
+        """The next message, if one comes soon."""
+        try:
+            message = self._arrived.get(timeout=0.05)
+        except queue.Empty:
+            return None
+        self._keep(message)
         return message
+
+    def _keep(self, message: Any) -> None:
+        self.heard.append(message)
+        if message.get_type() == "STATUSTEXT":
+            if message.id and message.chunk_seq and self._texts:
+                self._texts[-1] += message.text
+            else:
+                self._texts.append(message.text)
+
+    def _catch_up(self) -> None:
+        """Take in what came before: it is no answer to what is asked next."""
+        while not self._arrived.empty():
+            self._keep(self._arrived.get())
 
     def wait(self, holds: Callable[[Any], Any], what: str, patience: float = PATIENCE) -> Any:
         """The next message for which something is true."""
@@ -95,6 +124,7 @@ class PyMav:
     def command(self, number: int, *parameters: float, patience: float = PATIENCE) -> int:
         """Send a COMMAND_LONG; its result."""
         values = [*parameters, *[math.nan] * (7 - len(parameters))]
+        self._catch_up()
         self.link.mav.command_long_send(1, 1, number, 0, *values)
         ack = self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, "ack", patience)
         return int(ack.result)
@@ -102,6 +132,7 @@ class PyMav:
     def command_int(self, number: int, *parameters: float, patience: float = PATIENCE) -> int:
         """Send a COMMAND_INT with up to four parameters and no place; its result."""
         values = [*parameters, *[math.nan] * (4 - len(parameters))]
+        self._catch_up()
         relative = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         self.link.mav.command_int_send(1, 1, relative, number, 0, 0, *values, 0, 0, math.nan)
         ack = self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, "ack", patience)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-import pytest
 
 from sitl_bridge.mavlink.framing import split
 from tests.loopback.conftest import Process
@@ -18,7 +17,6 @@ FIRST = 40
 """Instances that nothing else on this machine is likely to use."""
 
 
-@pytest.mark.timeout(600)
 def test_eight_side_by_side(start: Callable[..., Process], tmp_path: Path) -> None:
     flights = []
     for instance in range(FIRST, FIRST + COUNT):

@@ -23,7 +23,6 @@ from tests.loopback.test_processes import KEYS
 Start = Callable[..., Process]
 
 
-@pytest.mark.timeout(400)
 def test_fly_over_a_stack_that_somebody_else_starts(start: Start, tmp_path: Path) -> None:
     stand_in = StandIn(start, tmp_path)
     out = tmp_path / "flight"
@@ -59,7 +58,6 @@ def test_fly_over_a_stack_that_somebody_else_starts(start: Start, tmp_path: Path
         assert words in errors
 
 
-@pytest.mark.timeout(400)
 def test_a_killed_companion_is_replaced_and_an_operator_is_obeyed(start: Start, tmp_path: Path) -> None:
     stand_in = StandIn(start, tmp_path)
     stand_in.start_plant()
@@ -129,7 +127,6 @@ def test_what_does_not_go_together_is_one_line(start: Start, arguments: tuple[st
     assert "Traceback" not in errors
 
 
-@pytest.mark.timeout(400)
 def test_identify_finds_the_rotors_lag_and_thrust(start: Start, tmp_path: Path) -> None:
     """One and a half times the usual lag of the rotors, of which autopilot and companion know nothing."""
     stand_in = StandIn(start, tmp_path)
@@ -152,7 +149,6 @@ def test_identify_finds_the_rotors_lag_and_thrust(start: Start, tmp_path: Path) 
     assert stack.model_dump() == {key: found[key] for key in stack.model_dump()}
 
 
-@pytest.mark.timeout(400)
 def test_the_load_is_moved_live_while_the_stack_flies(start: Start, tmp_path: Path) -> None:
     stand_in = StandIn(start, tmp_path)
     stand_in.start_plant()

@@ -21,6 +21,7 @@ from sitl.flights.report import PROMISED, write_report
 from sitl.flights.scenario import load_scenario
 from sitl.terminal.summary import table
 from sitl_bridge.vehicle.files import load_vehicle
+from tests.patience import PATIENCE
 
 
 def test_flying_alone_is_the_papers_experiment_whatever_options_stand_before() -> None:
@@ -45,7 +46,7 @@ def refused(*arguments: str, cwd: Path | None = None) -> list[str]:
         capture_output=True,
         text=True,
         cwd=cwd,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 2, done.stderr

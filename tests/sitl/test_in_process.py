@@ -15,6 +15,7 @@ import sitl
 from sitl.flights.free_ports import free_ports
 from sitl.flights.scenario import Scenario, Setpoint
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
+from tests.patience import LONG_PATIENCE, PATIENCE
 from tests.sitl.test_scenarios import FLOWN
 
 
@@ -35,7 +36,7 @@ def fly(tmp_path: Path, scenario: str, *more: str) -> dict[str, object]:
         *more,
     ]
     command += ["--hil", f"udpout:127.0.0.1:{port}", "--out", str(tmp_path)]
-    flight = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
+    flight = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONG_PATIENCE)
     assert flight.stdout, flight.stderr
     summary: dict[str, object] = json.loads(flight.stdout)
     return summary
@@ -61,7 +62,7 @@ def test_the_state_log_is_that_of_two_processes(scenario: str, tmp_path: Path) -
 )
 def test_what_takes_two_processes_is_refused(arguments: tuple[str, ...], says: str) -> None:
     command = [sys.executable, "-m", "sitl", "fly", *arguments, "--in-process"]
-    outcome = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    outcome = subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
     assert outcome.returncode == 2
     assert says in outcome.stderr
     assert outcome.stderr.count("\n") == 1

@@ -15,6 +15,7 @@ import sitl
 from controller.own_law.interface import LawError
 from sitl.flights.free_ports import free_ports
 from sitl_bridge.vehicle.files import DescriptionError
+from tests.patience import LONG_PATIENCE, PATIENCE
 
 TOP = Path(__file__).parents[2]
 EXAMPLES = {
@@ -40,7 +41,11 @@ def law_file(folder: Path, body: str = "pass", text: str = HOVERING) -> str:
 
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "sitl", *arguments], capture_output=True, text=True, check=False, timeout=240
+        [sys.executable, "-m", "sitl", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=LONG_PATIENCE,
     )
 
 
@@ -168,7 +173,7 @@ def test_a_law_that_cannot_be_flown_is_one_line(law: str, says: str, tmp_path: P
             capture_output=True,
             text=True,
             check=False,
-            timeout=60,
+            timeout=PATIENCE,
         )
         assert ended.returncode == 2, ended.stderr
         assert says in ended.stderr

@@ -27,8 +27,8 @@ from tests.loopback.clients import MavProxy, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
 from tests.loopback.flights import ready, refused, take_off
 from tests.loopback.lossy import lossy_relay
-from tests.loopback.patience import LONG_PATIENCE, PATIENCE
 from tests.loopback.pymav import HOLD, LAND, OFFBOARD, PyMav
+from tests.patience import LONG_PATIENCE, PATIENCE
 
 
 def port_of(connection: str) -> int:

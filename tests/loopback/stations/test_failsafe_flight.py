@@ -17,7 +17,7 @@ from tests.loopback.by_hand import ByHand
 from tests.loopback.clients import MavProxy, Texts, Vehicle, mavsdk_vehicle, until
 from tests.loopback.conftest import Process
 from tests.loopback.flights import WAITS_ARMED, ready
-from tests.loopback.patience import LONG_PATIENCE
+from tests.patience import LONG_PATIENCE
 
 AWAY = 12.0
 """m north of home, where it all goes wrong"""

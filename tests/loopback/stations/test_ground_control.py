@@ -20,8 +20,8 @@ from sitl.testing import SimulatedVehicle, flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Vehicle, mavsdk_vehicle, until
 from tests.loopback.flights import BRISK, WAITS_ARMED, mavproxy_flight, mavsdk_flight, take_off
-from tests.loopback.patience import PATIENCE
 from tests.loopback.pymav import PyMav
+from tests.patience import LONG_PATIENCE, PATIENCE
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 LOCKSTEP = ("--clock", "lockstep", "--speed", "1")
@@ -183,7 +183,7 @@ def test_the_examples_fly(
             [sys.executable, str(EXAMPLES / script), getattr(vehicle, link)],
             capture_output=True,
             text=True,
-            timeout=200,
+            timeout=LONG_PATIENCE,
             check=False,
         )
         assert done.returncode == 0, done.stdout + done.stderr + vehicle.log.read_text()[-2000:]
@@ -238,7 +238,7 @@ def test_the_fixture_example_runs_as_a_plugin(tmp_path: Path) -> None:
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert "1 passed" in done.stdout, done.stdout + done.stderr

@@ -14,8 +14,8 @@ from sitl.testing import flying_vehicle
 from tests.loopback import swing
 from tests.loopback.clients import Texts, Vehicle, mavsdk_vehicle, until
 from tests.loopback.flights import BRISK, METRES_PER_DEGREE, WAITS_ARMED, ready, refused
-from tests.loopback.patience import LONG_PATIENCE
 from tests.loopback.pymav import PyMav
+from tests.patience import LONG_PATIENCE
 
 PLACES = ((5.0, 0.0), (5.0, 60.0), (-60.0, 60.0), (0.0, 6.0))
 """m north and east of home; the second so far away that it is never reached before the jump to the last"""

@@ -14,7 +14,7 @@ from controller.ground.parameters.table import TABLE
 from sitl.testing import flying_vehicle
 from tests.loopback.clients import Vehicle, mavsdk_vehicle, until
 from tests.loopback.flights import METRES_PER_DEGREE, ready
-from tests.loopback.patience import LONG_PATIENCE
+from tests.patience import LONG_PATIENCE
 
 HOLDS_WITHOUT_STICKS = {"COM_RCL_EXCEPT": 2}
 

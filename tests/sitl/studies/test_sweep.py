@@ -20,6 +20,7 @@ from sitl.studies.sweep.study import RandomVehicles, Study, Vary, Verdict, load_
 from sitl.studies.sweep.verdicts import judge
 from sitl.studies.sweep.worker import fly_draw
 from sitl_bridge.vehicle.files import DescriptionError
+from tests.patience import LONG_PATIENCE
 
 STUDIES = Path(__file__).parents[3] / "studies"
 
@@ -187,13 +188,15 @@ def test_the_command_flies_judges_and_goes_on_where_it_was(tmp_path: Path) -> No
         "--workers",
         "1",
     ]
-    first = subprocess.run([*command, "--json"], capture_output=True, text=True, check=False, timeout=240)
+    first = subprocess.run(
+        [*command, "--json"], capture_output=True, text=True, check=False, timeout=LONG_PATIENCE
+    )
     assert first.returncode == 0, first.stderr
     result = json.loads(first.stdout)
     assert result["flights"] == 4
     assert result["verdicts"][0]["holds"]
     file.write_text(text.format(more="7.0, ", least=99))
-    second = subprocess.run(command, capture_output=True, text=True, check=False, timeout=240)
+    second = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LONG_PATIENCE)
     assert "6 flights, 4 flown already" in second.stderr
     assert second.returncode == 1
     assert "DOES NOT HOLD" in second.stdout
@@ -202,7 +205,7 @@ def test_the_command_flies_judges_and_goes_on_where_it_was(tmp_path: Path) -> No
     assert "--only" in page
     only = read_rows(tmp_path / "out")[0]["identity"]
     alone = subprocess.run(
-        [*command, "--only", only], capture_output=True, text=True, check=False, timeout=240
+        [*command, "--only", only], capture_output=True, text=True, check=False, timeout=LONG_PATIENCE
     )
     assert json.loads(alone.stdout)["inputs"]["load.mass"] in (5.0, 7.0, 10.0)
     assert (tmp_path / "out" / "logs" / only / "flight.png").exists()

@@ -19,12 +19,13 @@ from sitl.view.view import View
 from sitl.view.way import Way
 from sitl_bridge.frames import rotate
 from sitl_bridge.vehicle.files import load_vehicle
+from tests.patience import PATIENCE
 from tests.sitl.export.flights import leave_flight
 
 
 def sitl_view(*arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "sitl", "view", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE)
 
 
 @pytest.mark.parametrize(
