@@ -14,7 +14,7 @@ from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.mavlink.links import Address, Link, open_link
 from tests.loopback.by_hand import ByHand
 from tests.loopback.conftest import Process
-from tests.loopback.patience import LONG_PATIENCE
+from tests.patience import LONG_PATIENCE
 from tests.sitl.view.test_plan import FENCE, HOME, MISSION, RALLY
 
 STATION = Packer(245, 190)
