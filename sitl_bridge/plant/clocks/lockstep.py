@@ -112,10 +112,10 @@ class Lockstep:
         """Let a world that stands still go on for so many ticks."""
         if self.speed != 0.0 or ticks <= 0:
             return
-        self._steps = ticks
+        self._steps, self._not_before = ticks, now
         if self._state is State.READY:
             self._steps -= 1
-            self._not_before = self._due = now
+            self._due = now
 
     @property
     def steps_left(self) -> int:
