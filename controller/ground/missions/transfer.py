@@ -113,7 +113,7 @@ class Missions:
             self._ack(client, mavlink.MAV_MISSION_NO_SPACE, kind, reply)
         elif message.count == 0:
             self._uploads.pop(client, None)
-            self._finish(client, 0, (), reply, say)
+            self._finish(client, (), reply, say)
         elif client not in self._uploads and len(self._uploads) >= MOST_TRANSFERS:
             say("Too many mission uploads at once; try again later")
             self._ack(client, mavlink.MAV_MISSION_ERROR, kind, reply)
@@ -144,7 +144,7 @@ class Missions:
             self._ask(client, reply)
         else:
             del self._uploads[client]
-            self._finish(client, upload.count, tuple(upload.items), reply, say)
+            self._finish(client, tuple(upload.items), reply, say)
 
     def _guided(self, message: Any, client: Client, reply: Reply, say: Say) -> None:
         """An item that is no part of a plan: where to go now."""
@@ -160,11 +160,11 @@ class Missions:
 
     def _late_item(self, seq: int, client: Client, reply: Reply) -> None:
         """The last item again: our acknowledgement was lost."""
-        count, result = self._finished.get(client, (0, 0))
-        if count and seq == count - 1:
-            self._ack(client, result, self._kind, reply)
+        finished = self._finished.get(client)
+        if finished is not None and seq == finished[0] - 1:
+            self._ack(client, finished[1], self._kind, reply)
 
-    def _finish(self, client: Client, count: int, items: tuple[Item, ...], reply: Reply, say: Say) -> None:
+    def _finish(self, client: Client, items: tuple[Item, ...], reply: Reply, say: Say) -> None:
         fault = self._accept(items)
         if fault is None:
             self.items = items
@@ -173,7 +173,7 @@ class Missions:
         result = mavlink.MAV_MISSION_ACCEPTED if fault is None else fault.result
         while len(self._finished) >= MOST_TRANSFERS:
             del self._finished[next(iter(self._finished))]
-        self._finished[client] = (count, result)
+        self._finished[client] = (len(items), result)
         self._ack(client, result, self._kind, reply)
 
     def _acknowledged(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
@@ -216,7 +216,7 @@ class Missions:
             if now - upload.last_item >= PATIENCE:
                 del self._uploads[client]
                 got = f"{len(upload.items)} of {upload.count}"
-                text = f"Mission upload stopped at item {got}; nothing has changed"
+                text = f"{self._name} upload stopped at item {got}; nothing has changed"
                 cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
                 message = mavlink.MAVLink_mission_ack_message(
                     client.system, client.component, cancelled, self._kind

@@ -28,8 +28,6 @@ LIST_RATE = 500.0
 Reply = Callable[[Any], None]
 Say = Callable[[str], None]
 
-_HASH_FIRST = -1
-"""Place in a list, of the hash that goes before the parameters"""
 _INDEX = {parameter.name: index for index, parameter in enumerate(TABLE)}
 
 
@@ -102,7 +100,7 @@ class Parameters:
 
     def request_list(self, peer: Address, now: float) -> None:
         """PARAM_REQUEST_LIST: from the beginning, also when a list is under way."""
-        self._lists[peer] = (_HASH_FIRST, now)
+        self._lists[peer] = (0, now)
 
     def request_read(self, name: str, index: int, reply: Reply, say: Say) -> None:
         """PARAM_REQUEST_READ: by name if the index is -1."""
@@ -131,8 +129,8 @@ class Parameters:
             say(f"{name} is {'INT32' if p.is_integer else 'REAL32'}, not MAV_PARAM_TYPE {kind}")
             reply(_error(name, _INDEX[name], ERROR_TYPE_MISMATCH))
             return False
-        value = float(struct.unpack("<i" if p.is_integer else "<f", raw)[0])
-        fault = self.set(name, value)
+        (value,) = struct.unpack("<i" if p.is_integer else "<f", raw)
+        fault = self.set(name, float(value))
         if fault:
             say(fault)
             reply(_error(name, _INDEX[name], ERROR_OUT_OF_RANGE))
@@ -182,17 +180,17 @@ class Parameters:
             if peer not in known:
                 del self._lists[peer]
                 continue
-            most = 1 + int(max(0.0, min(now - due, 0.02)) * LIST_RATE)
-            count = most if now >= due else 0
-            if index == _HASH_FIRST and count:
+            if now < due:
+                continue
+            count = 1 + int(min(now - due, 0.02) * LIST_RATE)
+            if index == 0:
                 out.append((peer, self._hash_message()))
-                index = 0
             for p in TABLE[index : index + count]:
                 out.append((peer, self._value_message(p)))
             index += count
             if index >= len(TABLE):
                 del self._lists[peer]
-            elif count:
+            else:
                 self._lists[peer] = (index, now + 1.0 / LIST_RATE)
         return out
 
@@ -204,7 +202,7 @@ class Parameters:
 def as_own_type(name: str, kind: int, raw: bytes) -> tuple[int, bytes]:
     """Type and bytes of a value that a client sends as a float whatever the parameter is."""
     p = BY_NAME.get(name)
-    value = struct.unpack("<f", raw)[0]
+    (value,) = struct.unpack("<f", raw)
     if p is None or not p.is_integer or kind != mavlink.MAV_PARAM_TYPE_REAL32:
         return kind, raw
     if not abs(value) < 2**31 or value != int(value):
@@ -229,7 +227,8 @@ def _number(value: object) -> float | None:
 
 def single(value: float) -> float:
     """A number as a float32 keeps it."""
-    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    (kept,) = struct.unpack("<f", struct.pack("<f", value))
+    return float(kept)
 
 
 def _float32(p: Parameter) -> float:
