@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -36,9 +35,10 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
-        from controller.design.ramp import planned  # scipy's optimizer: nothing else in flight takes it
+        from controller.design.prepared import PreparedMotion  # scipy's optimizer: nothing else takes it
 
-        self._plan = partial(planned, vehicle=vehicle, estimated=design_name == ON_ESTIMATE)
+        expected = path_from(vehicle.initial_load_position)
+        self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)
         self._path_from = path_from
         self._design = design(design_name, vehicle, rate_hz)
         self._allocation = allocation(vehicle)
@@ -59,7 +59,7 @@ class Autopilot:
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
         if self._step is None:
-            path = planned_from(self._path_from, estimate, self._plan)
+            path = planned_from(self._path_from, estimate, self._motion.planned)
             memory = engaged_memory(estimate[LOAD_POSITION])
             law = (self._design, self._allocation, path, memory, np.zeros(1, dtype=WORK))
             self._step = control_step.bind(*law, estimate, self._controls)
