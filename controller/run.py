@@ -14,8 +14,10 @@ from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import AwakeClock
 from sitl_bridge.log_amount import Logs
-from sitl_bridge.mavlink.links import Address, Link, open_link
-from sitl_bridge.mavlink.lossy_link import LossyLink
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.lossy import LossyLink
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle

@@ -25,7 +25,9 @@ from controller.over.load.source import TruthSource
 from controller.over.stack import Stack
 from controller.over.states import State, Step
 from sitl_bridge.mavlink.framing import split
-from sitl_bridge.mavlink.links import Address, Link, open_link
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.rowlog import RowLog
 from sitl_bridge.vehicle.cable_law import linearised

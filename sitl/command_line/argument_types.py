@@ -45,7 +45,7 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
 
 def link_address(text: str) -> str:
     """An argument type: the address of a link, the port perhaps left out."""
-    from sitl_bridge.mavlink.links import parse_address
+    from sitl_bridge.mavlink.links.address import parse_address
 
     try:
         address = parse_address(text, HIL_UDP_PORT, HIL_TCP_PORT)
@@ -58,7 +58,7 @@ def link_address(text: str) -> str:
 
 def stack_address(text: str) -> str:
     """An argument type: the address of a flight stack, a serial line's too."""
-    from sitl_bridge.mavlink.links import parse_stack_address
+    from sitl_bridge.mavlink.links.address import parse_stack_address
 
     try:
         address = parse_stack_address(text, STACK_UDP_PORT, STACK_TCP_PORT)
@@ -71,7 +71,7 @@ def stack_address(text: str) -> str:
 
 def host_and_port(text: str) -> tuple[str, int]:
     """An argument type: HOST:PORT."""
-    from sitl_bridge.mavlink.links import possible_host
+    from sitl_bridge.mavlink.links.address import possible_host
 
     host, _, port = text.rpartition(":")
     if not possible_host(host) or not port.isdecimal() or not 0 < int(port) <= 65535:

@@ -30,7 +30,7 @@ from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 if TYPE_CHECKING:
     from controller.pilot.ground_link import GroundOptions
     from sitl.flights.scenario import Scenario
-    from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.mavlink.links.address import Address
     from sitl_bridge.plant.clocks.lockstep import OnSilence
     from sitl_bridge.plant.faults.schedule import Faults
 
@@ -50,7 +50,7 @@ def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
 
 
 def _hil_address(arguments: argparse.Namespace, kind: str) -> Address:
-    from sitl_bridge.mavlink.links import parse_address
+    from sitl_bridge.mavlink.links.address import parse_address
 
     udp_port, tcp_port = HIL_UDP_PORT + arguments.instance, HIL_TCP_PORT + arguments.instance
     return parse_address(arguments.hil or kind, udp_port, tcp_port)
@@ -222,7 +222,7 @@ def _fly(arguments: argparse.Namespace) -> int:
     from sitl.flights.report import written
     from sitl.flights.scenario import GroundControl, load_scenario, with_agility
     from sitl.terminal.summary import table
-    from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.mavlink.links.address import Address
 
     scenario = with_agility(load_scenario(arguments.scenario), arguments.agility)
     with prints_to_stderr(arguments.law is not None):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from controller.ground.link.ports import STATION_PEER
 from sitl.command_line.argument_types import STACK_TCP_PORT, STACK_UDP_PORT
 from sitl.exit_codes import FAILED, INTERRUPTED
-from sitl_bridge.mavlink.links import parse_address, parse_stack_address
+from sitl_bridge.mavlink.links.address import parse_address, parse_stack_address
 from sitl_bridge.process import Speaker, StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from controller.over.run import LivePorts, OverOptions
     from sitl.command_line.commands import Timing
     from sitl.flights.scenario import Scenario
-    from sitl_bridge.mavlink.links import Address
+    from sitl_bridge.mavlink.links.address import Address
 
 TRUTH_PORT = 19410
 LOAD_TO_PORT = 19411

@@ -66,7 +66,7 @@ def run_view(arguments: argparse.Namespace) -> int:
     """Show until Ctrl-C; exit code 2 for a source that is none."""
     from sitl.recording.recording import RecordingError
     from sitl.view.run import ViewOptions, run
-    from sitl_bridge.mavlink.links import parse_address
+    from sitl_bridge.mavlink.links.address import parse_address
 
     flights = [Path(source) for source in arguments.sources if Path(source).exists()]
     if flights and len(arguments.sources) > 1:

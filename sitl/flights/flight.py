@@ -29,7 +29,8 @@ from sitl.flights.scenario import (
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
 from sitl_bridge.log_amount import Logs
-from sitl_bridge.mavlink.links import Address, open_link
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle

@@ -20,7 +20,7 @@ from controller.own_law.find import ChosenLaw
 from controller.own_law.interface import LawError
 from controller.run import ControllerOptions, Session, open_session
 from sitl_bridge.log_amount import Logs
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import RECORDED_HZ, TlogWriter
 from sitl_bridge.plant.clocks.lockstep import Lockstep

@@ -22,7 +22,8 @@ from sitl.over.window import cut_log, step_figures
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
 from sitl.terminal.summary import row
-from sitl_bridge.mavlink.links import Address, open_link
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.plant.log.state_log import FILE_NAME
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle

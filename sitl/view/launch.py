@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sitl.flights.free_ports import free_ports
 from sitl.recording.recording import VEHICLE_NAME, write_vehicle
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 

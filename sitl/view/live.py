@@ -14,7 +14,9 @@ from sitl.view.page.steering import Steering
 from sitl.view.view import View
 from sitl.view.way import Way
 from sitl_bridge.frames import LocalOrigin
-from sitl_bridge.mavlink.links import Address, Link, open_link
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 

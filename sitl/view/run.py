@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from sitl.recording.recording import read_recording, read_vehicle
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle

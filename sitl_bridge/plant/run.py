@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sitl_bridge.log_amount import Logs
-from sitl_bridge.mavlink.links import Address, Link, open_link
-from sitl_bridge.mavlink.lossy_link import LossyLink
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.lossy import LossyLink
+from sitl_bridge.mavlink.links.opening import open_link
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.mavlink.tlog import RECORDED_HZ, TlogWriter
 from sitl_bridge.plant.clocks.lateness import Lateness

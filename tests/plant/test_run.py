@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.tlog import TlogWriter
 from sitl_bridge.plant import run
 from sitl_bridge.plant.physics.state import STOPPED

@@ -17,7 +17,7 @@ from sitl.flights.metrics import reference_positions
 from sitl.flights.report import positions, read_state_log
 from sitl.flights.scenario import GroundControl, load_scenario, scenario_vehicle
 from sitl.studies.paper.offline import RATE_HZ
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.plant.log.state_log import FILE_NAME
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle

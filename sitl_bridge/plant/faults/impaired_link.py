@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from sitl_bridge.mavlink.links import Link
+from sitl_bridge.mavlink.links.link import Link
 from sitl_bridge.plant.faults.impairments import FaultyPath
 from sitl_bridge.plant.faults.schedule import LinkFault
 

@@ -11,7 +11,9 @@ from pymavlink.dialects.v20 import common as mavlink
 from sitl.view.listener import Listener
 from sitl.view.plan import plan_of
 from sitl_bridge.mavlink.framing import Packer, decode, split
-from sitl_bridge.mavlink.links import Address, Link, open_link
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.opening import open_link
 from tests.loopback.by_hand import ByHand
 from tests.loopback.conftest import Process
 from tests.patience import LONG_PATIENCE

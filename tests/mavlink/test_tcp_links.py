@@ -10,7 +10,10 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from sitl_bridge.mavlink.framing import Packer, split
-from sitl_bridge.mavlink.links import LONGEST_WAIT, Address, TcpLink, open_link, parse_address
+from sitl_bridge.mavlink.links.address import Address, parse_address
+from sitl_bridge.mavlink.links.link import LONGEST_WAIT
+from sitl_bridge.mavlink.links.opening import open_link
+from sitl_bridge.mavlink.links.tcp import TcpLink
 from tests.patience import PATIENCE
 
 packer = Packer(1, 191)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from sitl_bridge.mavlink.links import Link
+from sitl_bridge.mavlink.links.link import Link
 
 
 class LossyLink:

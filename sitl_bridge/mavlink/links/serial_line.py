@@ -10,14 +10,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from sitl_bridge.mavlink.framing import LARGEST_DATAGRAM, StreamSplitter
+from sitl_bridge.mavlink.links.link import LONGEST_WAIT
 
 if TYPE_CHECKING:
     import serial
 
 RETRY_INTERVAL = 0.5
 """s between two attempts to open a device that has gone."""
-LONGEST_WAIT = 0.1
-"""s; a wait is cut to this, so that a process notices soon that it is asked to stop."""
 MOST_UNSENT = 1 << 14
 """Bytes that wait for a slow line before further datagrams are lost."""
 

@@ -11,7 +11,9 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from sitl_bridge.mavlink.framing import Packer, split
-from sitl_bridge.mavlink.links import Address, Link, open_link, parse_stack_address
+from sitl_bridge.mavlink.links.address import Address, parse_stack_address
+from sitl_bridge.mavlink.links.link import Link
+from sitl_bridge.mavlink.links.opening import open_link
 
 BEAT = Packer(1, 1).pack(mavlink.MAVLink_heartbeat_message(2, 12, 1, 0, 4, 3))
 

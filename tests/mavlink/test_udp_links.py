@@ -9,8 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from sitl_bridge.mavlink import links
-from sitl_bridge.mavlink.links import Address, UdpLink
+from sitl_bridge.mavlink.links import udp
+from sitl_bridge.mavlink.links.address import Address
+from sitl_bridge.mavlink.links.udp import UdpLink
 from tests.patience import PATIENCE
 
 
@@ -21,7 +22,7 @@ def link(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Ite
         def refuse(*_: object) -> None:
             raise OSError(errno.EADDRINUSE, "as on other systems")
 
-        monkeypatch.setattr(links, "_beside", refuse)
+        monkeypatch.setattr(udp, "_beside", refuse)
     opened = UdpLink(Address("udpin", "127.0.0.1", 0), punctual=request.param == "punctual")
     yield opened
     opened.close()
