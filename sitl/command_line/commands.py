@@ -115,6 +115,8 @@ def _audience(
         return nullcontext()
     from sitl.view.launch import check_installed, viewer
 
+    if getattr(arguments, "in_process", False):
+        raise DescriptionError("--in-process", ["--view takes a plant in a process of its own"])
     check_installed()
     return viewer(vehicle, more, arguments.scenario)
 

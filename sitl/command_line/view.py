@@ -28,7 +28,7 @@ def add_view(commands: Any) -> None:
         nargs="*",
         default=[DEFAULT_SOURCE],
         help="links to listen on (udpin:HOST:PORT, udpout:…, tcpout:…), or the folder of a finished flight, "
-        "or a .tlog (default: %(default)s, where a ground station listens)",
+        f"or a .tlog (default: {DEFAULT_SOURCE}, where a ground station listens)",
     )
     parser.add_argument(
         "--vehicle", metavar="NAME|FILE", help="what it looks like (default: the flight's, or iris)"
@@ -80,6 +80,8 @@ def run_view(arguments: argparse.Namespace) -> int:
                 return _refuse(f"{error}, or the folder or .tlog of a finished flight")
     if arguments.export is not None and not flights:
         return _refuse("--export: goes with the folder or .tlog of a finished flight")
+    if arguments.scenario is not None and flights:
+        return _refuse("--scenario: goes with links; a finished flight has its own reference")
     options = ViewOptions(
         addresses=addresses,
         flight=flights[0] if flights else None,

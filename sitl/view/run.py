@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import socket
 import sys
 import webbrowser
 from collections.abc import Sequence
@@ -19,6 +20,8 @@ from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 
+HERE = "127.0.0.1"
+"""Who serves the page to this machine alone."""
 PORT = 8080
 TRUTH_PORT = 19410
 """Where PX4's viewers listen for HIL_STATE_QUATERNION."""
@@ -39,7 +42,7 @@ class ViewOptions:
     """Name or file of the scenario whose reference is drawn."""
     export: Path | None = None
     """Write the page here, serve nothing."""
-    host: str = "127.0.0.1"
+    host: str = HERE
     port: int = PORT
     browser: bool = True
     """Open one where there is a display."""
@@ -63,7 +66,7 @@ def run(options: ViewOptions, stop: StopRequest) -> None:
 
             export_html(views, vehicle, server, options.export)
             return
-        _announce(options, server)
+        announce(options, server)
         if views:
             from sitl.view.playback import play
 
@@ -105,12 +108,14 @@ def _server(options: ViewOptions) -> Any:
         return viser.ViserServer(host=options.host, port=options.port, label="sitl", verbose=False)
 
 
-def _announce(options: ViewOptions, server: Any) -> None:
+def announce(options: ViewOptions, server: Any) -> None:
     """Print the address, and open a browser where there is a display."""
-    address = f"http://{options.host}:{server.get_port()}"
+    port = server.get_port()
+    address = f"http://{HERE}:{port}"
     if options.events:
         print(json.dumps({"event": "view", "address": address}), flush=True)
-    print(f"view: {address}", file=sys.stderr, flush=True)
+    outside = "" if options.host == HERE else f", and from elsewhere http://{socket.gethostname()}:{port}"
+    print(f"view: {address}{outside}", file=sys.stderr, flush=True)
     if options.browser and has_display():
         webbrowser.open(address)
 

@@ -21,9 +21,9 @@ Colour = tuple[int, int, int]
 _SLACK: Colour = (150, 150, 150)
 THICKNESS, THICKNESS_SHARE = 0.008, 0.002
 """m, radius of a rod, and how much more for each metre of cable: a long one is seen from further away."""
-LENGTH_STEP = 0.002
+LENGTH_STEP = 0.005
 """Share by which a piece's length changes before its rod is drawn longer."""
-COLOUR_STEPS = 16
+COLOUR_STEPS = 8
 """Shades from green to red."""
 
 

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import subprocess
 import sys
+import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from sitl.command_line.commands import main
 from sitl.flights.scenario import Circle, load_scenario
 from sitl.recording.recording import RecordingError, read_recording
 from sitl.view.page.cable import along, colour_of, load_shares
 from sitl.view.page.panel import aim, numbers, plotted
 from sitl.view.replay import views_of_recording, views_of_tlog
+from sitl.view.run import ViewOptions, announce
 from sitl.view.view import View
 from sitl.view.way import Way
 from sitl_bridge.frames import rotate
+from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.patience import PATIENCE
 from tests.sitl.export.flights import leave_flight
@@ -36,6 +42,7 @@ def sitl_view(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("udpin:127.0.0.1:20001", "--export", "x.html"), "--export"),
         ((".", "udpin:127.0.0.1:20001"), "shown alone"),
         ((".",), "state.parquet"),
+        ((".", "--scenario", "circle"), "--scenario"),
     ],
 )
 def test_a_source_that_is_none_is_one_line(arguments: tuple[str, ...], says: str, tmp_path: Path) -> None:
@@ -126,3 +133,40 @@ def test_what_is_not_known_is_not_plotted() -> None:
     known = [not math.isnan(number) for number in plotted(View(tension=3.0, vehicle=(0.0, 0.0, 1.0)))]
     assert known == [True, False, True, False]
     assert plotted(View(battery=0.5))[3] == 50.0
+
+
+def test_without_viser_it_says_what_to_install_before_anything_is_launched(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(StopRequest, "install", lambda *arguments, **options: None)
+    monkeypatch.setattr(subprocess, "Popen", lambda *arguments, **options: pytest.fail("launched"))
+    for command in (["fly", "circle", "--view"], ["plant", "--view"], ["view"]):
+        assert main(command) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert "pip install 'sitl-bridge[view]'" in said
+
+
+@pytest.mark.parametrize(
+    ("display", "browser", "opened"), [("", True, False), (":0", True, True), (":0", False, False)]
+)
+def test_a_browser_is_opened_where_there_is_a_display(
+    monkeypatch: pytest.MonkeyPatch, display: str, browser: bool, opened: bool
+) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setenv("DISPLAY", display)
+    addresses: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", addresses.append)
+    server = SimpleNamespace(get_port=lambda: 8081)
+    announce(ViewOptions(browser=browser, host="0.0.0.0"), server)
+    assert addresses == (["http://127.0.0.1:8081"] if opened else [])
+
+
+def test_a_flight_in_one_process_is_not_shown() -> None:
+    command = [sys.executable, "-m", "sitl", "fly", "setpoint", "--in-process", "--view"]
+    outcome = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("--in-process: --view")
