@@ -181,6 +181,8 @@ def _vehicles(
     only_plant = [Override(text, "plant_overrides") for text in plant_overrides]
     common = [Override(text, "overrides") for text in overrides]
     told = scenario_vehicle(scenario, vehicle, common)
+    if not scenario.plant_set and not only_plant:
+        return told, told
     return told, plant_vehicle(scenario, vehicle, [*common, *only_plant])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Home
 
@@ -11,6 +13,7 @@ EPOCH = 2026.5
 model holds from 2025 to 2030 and drifts by 0.2 % a year."""
 
 
+@lru_cache(maxsize=16)
 def field_at(home: Home) -> Triple:
     """The field at home, T, ENU. Imports the model on first use: some 10 ms."""
     from pygeomag import GeoMag

@@ -12,6 +12,7 @@ from controller.design.estimated_weights import estimated_weights
 from controller.design.lqr import Weights, sampled_gain, sampled_model
 from controller.design.model import actuated_model, rotor_time_constant, with_integrator
 from controller.design.names import DESIGNS, ON_ESTIMATE
+from controller.design.remembered import remembered
 from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
 from controller.law.flatness import body
 from controller.law.state import (
@@ -142,6 +143,7 @@ def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) 
     return loaded, alone
 
 
+@remembered(64)
 def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int, loaded: bool = True) -> Design:
     """The design that minimises a cost in the sampled loop of a vehicle: a record of shape (1,).
 

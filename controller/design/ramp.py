@@ -17,6 +17,7 @@ from scipy.interpolate import PPoly
 from controller.design.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
 from controller.design.fastest import fastest
 from controller.design.limits import Limits, limits_of
+from controller.design.remembered import remembered
 from controller.design.straight_line import StraightLine, drag_force
 from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
@@ -59,6 +60,7 @@ class Demand(NamedTuple):
     """N, the least."""
 
 
+@remembered(64)
 def planned(path: Path, vehicle: Vehicle, estimated: bool = False) -> Path:
     """The path (1,) with a ramp that suits the vehicle and its agility; one given moment by moment stays.
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
+from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -70,7 +72,7 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
     entry = Path(name_or_file) if is_path(name_or_file) else folder / f"{name_or_file}.toml"
     try:
         text = entry.read_text(encoding="utf-8")
-        return name_or_file, tomllib.loads(text)
+        return name_or_file, deepcopy(_parsed(text))
     except FileNotFoundError:
         known = shipped(folder)
         raise DescriptionError(
@@ -86,6 +88,12 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
         raise DescriptionError(name_or_file, ["not valid TOML: nested too deeply"]) from None
     except (OSError, ValueError) as error:  # ValueError: not UTF-8, or no possible path
         raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> dict[str, Any]:
+    """A study reads the same few files for each of its flights."""
+    return tomllib.loads(text)
 
 
 def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = ()) -> Vehicle:

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -115,6 +116,7 @@ def fly_batch(batch: list[dict[str, Any]], study: dict[str, Any], out: str) -> l
     return rows
 
 
+@cache
 def _versions() -> str:
     return " ".join(f"{name} {metadata.version(name)}" for name in ("sitl-bridge", "numpy"))
 
