@@ -5,6 +5,7 @@ from __future__ import annotations
 COMPONENT_AUTOPILOT = 1
 COMPONENT_TRUTH = 191  # MAV_COMP_ID_ONBOARD_COMPUTER: the plant speaking about the vehicle
 COMPONENT_LOAD = 35  # ArduPilot's precedent for a simulated slung payload
+COMPONENT_WINCH = 169  # MAV_COMP_ID_WINCH: MAVSDK addresses DO_WINCH to it
 
 ACTUATOR_CONTROLS = 16
 """Controls in HIL_ACTUATOR_CONTROLS: the most rotors that a vehicle can have."""

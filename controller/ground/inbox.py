@@ -28,7 +28,7 @@ from controller.ground.parameters.protocol import HASH_CHECK, Parameters, as_own
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.plant_clock import PlantClock
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, enu_to_ned, euler_from_quaternion
-from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD, COMPONENT_WINCH
 from sitl_bridge.mavlink.framing import Frame
 
 _MISSION_COMPONENTS = (0, COMPONENT_AUTOPILOT, mavlink.MAV_COMP_ID_MISSIONPLANNER)
@@ -95,9 +95,13 @@ class Inbox:
         )
 
     def _command(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
-        to_load = self._to_load(message)
-        if to_load or self._addressed(message):
-            self._commands.receive(message, frame, peer, to_load, now)
+        own = message.target_system == self._profile.system
+        if self._to_load(message):
+            self._commands.receive(message, frame, peer, COMPONENT_LOAD, now)
+        elif self._addressed(message):
+            self._commands.receive(message, frame, peer, COMPONENT_AUTOPILOT, now)
+        elif own and message.target_component == COMPONENT_WINCH and self._profile.winch is not None:
+            self._commands.receive(message, frame, peer, COMPONENT_WINCH, now)
 
     def _set_mode(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if message.target_system == self._profile.system:

@@ -34,8 +34,9 @@ def test_default_rates() -> None:
     rig = Rig()
     client = rig.client()
     rig.run(10.0)
-    # Nothing to say without a load on the link, on the ground, without a pattern:
+    # Nothing to say without a load on the link, on the ground, without a pattern, without a winch:
     silent = (
+        mavlink.MAVLINK_MSG_ID_WINCH_STATUS,
         mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE,
         mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED,
         mavlink.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS,

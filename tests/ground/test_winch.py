@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import common as mavlink
 
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
@@ -93,6 +94,24 @@ def test_what_is_no_action_is_denied() -> None:
     assert client.command(DO_WINCH, 1, RATE, 0, NAN).result == DENIED
     flight.run(1.0)
     assert flight.simulation.world.reel().rate == 0.0
+
+
+def test_the_winch_answers_as_a_component_of_its_own() -> None:
+    """MAVSDK's plug-in addresses MAV_COMP_ID_WINCH, and waits for an answer from there."""
+    flight, client = hovering()
+    client.clear()
+    for number in (DO_WINCH, 400):
+        client.send(mavlink.MAVLink_command_long_message(1, 169, number, 0, 1, RETRACT, 0, 0, 0, 0, 0))
+        flight.run(0.1)
+    assert [ack.result for ack in client.got("COMMAND_ACK")] == [ACCEPTED, UNSUPPORTED]
+    assert {ack.get_srcComponent() for ack in client.got("COMMAND_ACK")} == {169}
+    flight.run(3.0)
+    status = client.got("WINCH_STATUS")[-1]
+    assert status.status & 256  # it is retracting
+    assert status.tension == pytest.approx(flight.vehicle.load.mass, abs=0.05)  # kg
+    winch = flight.vehicle.winch
+    assert winch is not None
+    assert winch.min_length - 0.1 < status.line_length < flight.vehicle.cable.rest_length
 
 
 def test_a_vehicle_without_a_winch_says_so() -> None:

@@ -16,6 +16,7 @@ from controller.ground.flight.patterns import LARGEST_RADIUS, FigureEight, Orbit
 from controller.ground.flight.payload.gripper import GRIPPER_ACTIONS, HOLD
 from controller.ground.flight.px4_modes import Mode, find_mode, find_standard_mode
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, Triple, yaw_from_heading
+from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_WINCH
 
 FORCE = 21196.0
 """param2 of an arm or disarm command that is meant in any case"""
@@ -50,7 +51,8 @@ class Command(NamedTuple):
     """p7 is above home; else above mean sea level"""
     frame_fault: str
     """Why the frame cannot be used, or an empty string"""
-    to_load: bool
+    component: int
+    """Whom it is for: autopilot, load or winch"""
 
 
 _WITH_PLACE = frozenset(
@@ -67,12 +69,12 @@ _WITH_PLACE = frozenset(
 )
 
 
-def command_of(message: Any, to_load: bool) -> Command:
+def command_of(message: Any, component: int) -> Command:
     """The command of a COMMAND_LONG or COMMAND_INT message."""
     p = (message.param1, message.param2, message.param3, message.param4)
     if message.id == mavlink.MAVLINK_MSG_ID_COMMAND_LONG:
         rest = (message.param5, message.param6, message.param7)
-        return Command(message.command, *p, *rest, False, "", to_load)
+        return Command(message.command, *p, *rest, False, "", component)
     scale = DEG_E7_PER_DEG if message.command in _WITH_PLACE else 1.0
     x, y = (math.nan if v == _UNSET_INT else v / scale for v in (message.x, message.y))
     relative = message.frame in (
@@ -81,7 +83,7 @@ def command_of(message: Any, to_load: bool) -> Command:
     )
     absolute = message.frame in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT)
     fault = "" if relative or absolute else f"Frame {message.frame} is not supported; use 0, 5 (AMSL), 3 or 6"
-    return Command(message.command, *p, x, y, message.z, relative, fault, to_load)
+    return Command(message.command, *p, x, y, message.z, relative, fault, component)
 
 
 class Requests(Protocol):
@@ -169,8 +171,9 @@ def execute(command: Command, machine: Machine, requests: Requests, now: float) 
         entry = mavlink.enums["MAV_CMD"].get(command.number)
         name = entry.name.removeprefix("MAV_CMD_") if entry else "unknown"
         return Verdict(UNSUPPORTED, f"Command {command.number} ({name}) is not supported")
-    if command.to_load and command.number not in _FOR_LOAD:
-        return Verdict(UNSUPPORTED, f"Command {command.number} is not the load's; address the vehicle")
+    if command.component in _ONLY and command.number != _ONLY[command.component]:
+        name = "load" if command.component == COMPONENT_LOAD else "winch"
+        return Verdict(UNSUPPORTED, f"Command {command.number} is not the {name}'s; address the vehicle")
     placed = command.number in _WITH_PLACE and any(not math.isnan(p) for p in command[5:8])
     if placed and command.frame_fault:
         return Verdict(UNSUPPORTED_FRAME, f"Command denied: {command.frame_fault}")
@@ -219,7 +222,7 @@ def _reposition(c: Command, machine: Machine, requests: Requests, now: float) ->
     east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, home.altitude))
     yaw = math.nan if math.isnan(c.p4) else yaw_from_heading(c.p4) if math.isfinite(c.p4) else c.p4
     speed = c.p1 if c.p1 > 0 else math.nan
-    where = Reposition(c.to_load, (east, north, _height(c, machine)), yaw, speed)
+    where = Reposition(c.component == COMPONENT_LOAD, (east, north, _height(c, machine)), yaw, speed)
     return machine.reposition(where, c.p2 == 1.0)
 
 
@@ -436,7 +439,8 @@ _HANDLERS: dict[int, _Handler] = {
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: _calibrate,
     mavlink.MAV_CMD_INJECT_FAILURE: _inject_failure,
 }
-_FOR_LOAD = frozenset((mavlink.MAV_CMD_DO_REPOSITION,))
+_ONLY = {COMPONENT_LOAD: mavlink.MAV_CMD_DO_REPOSITION, COMPONENT_WINCH: mavlink.MAV_CMD_DO_WINCH}
+"""The one command that load or winch take"""
 
 
 def _height(c: Command, machine: Machine) -> float:

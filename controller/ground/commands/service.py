@@ -19,6 +19,7 @@ from controller.ground.link.peers import Peer
 from controller.ground.parameters.storage import StoredParameters
 from controller.ground.telemetry import messages as telemetry
 from controller.ground.telemetry.message_rates import STREAMABLE
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD, COMPONENT_WINCH
 from sitl_bridge.mavlink.framing import Frame
 
 Build = Callable[[int, float], Any]
@@ -49,19 +50,20 @@ class CommandService:
         self._under_way: set[Hashable] = set()
         """Commands whose verdict is still to come"""
 
-    def receive(self, message: Any, frame: Frame, peer: Peer, to_load: bool, now: float) -> None:
-        """A command for the vehicle or the load."""
-        command = command_of(message, to_load)
+    def receive(self, message: Any, frame: Frame, peer: Peer, component: int, now: float) -> None:
+        """A command for the vehicle's autopilot or winch, or for the load."""
+        command = command_of(message, component)
+        source = {COMPONENT_LOAD: self.out.load, COMPONENT_WINCH: self.out.winch}.get(component)
         sender = (peer.address, frame.system, frame.component)
         numbers = struct.pack("<7d", *_finite(command))
-        key = Key(sender, (message.id, to_load, command.number, numbers))
+        key = Key(sender, (message.id, component, command.number, numbers))
         confirmation = getattr(message, "confirmation", 0)
         sequence = frame.raw[4 if frame.version == 2 else 2]
 
         def acknowledge(verdict: Verdict, now: float) -> None:
             ack = mavlink.MAVLink_command_ack_message
             reply = ack(command.number, verdict.result, 0, 0, frame.system, frame.component)
-            self.out.send(peer, reply, now, of_load=to_load)
+            self.out.send(peer, reply, now, source)
 
         def finish(verdict: Verdict, now: float) -> None:
             self._under_way.discard(key)
@@ -86,7 +88,14 @@ class CommandService:
         """SET_MODE, which some clients still send instead of DO_SET_MODE."""
         main, sub = message.custom_mode >> 16 & 0xFF, message.custom_mode >> 24 & 0xFF
         command = Command(
-            mavlink.MAV_CMD_DO_SET_MODE, message.base_mode, main, sub, *(math.nan,) * 4, False, "", False
+            mavlink.MAV_CMD_DO_SET_MODE,
+            message.base_mode,
+            main,
+            sub,
+            *(math.nan,) * 4,
+            False,
+            "",
+            COMPONENT_AUTOPILOT,
         )
         verdict = execute(command, self.machine, _PeerRequests(self, peer, now, lambda *_: None), now)
         if verdict is not None and not verdict.ok:

@@ -12,13 +12,15 @@ from controller.ground.link.packing import packed
 from controller.ground.link.peers import Peer, Peers
 from controller.ground.link.signing import Signing
 from controller.ground.telemetry.vehicle_state import Profile
-from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD
+from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_LOAD, COMPONENT_WINCH
 
 TEXT_LENGTH = 50
 """Characters of one STATUSTEXT; longer texts go in pieces"""
 TEXT_PAUSE = 2.0
 """s, in which the same text, whatever its numbers, is not said twice to a peer"""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?")
+Source = tuple[int, int]
+"""MAVLink system and component"""
 _MOST_TEXTS = 64
 """Texts that are remembered for that"""
 
@@ -29,14 +31,15 @@ class Outbox:
     def __init__(self, peers: Peers, profile: Profile, signing: Signing | None) -> None:
         self.vehicle = (profile.system, COMPONENT_AUTOPILOT)
         self.load = (profile.load_system, COMPONENT_LOAD)
+        self.winch = (profile.system, COMPONENT_WINCH)
         self._peers = peers
         self._signing = signing
 
-    def send(self, peer: Peer, message: Any, now: float, of_load: bool = False) -> None:
-        """A message to one peer; one whose numbers do not fit is not sent."""
+    def send(self, peer: Peer, message: Any, now: float, sender: Source | None = None) -> None:
+        """A message to one peer, by default the vehicle's; one whose numbers do not fit is not sent."""
         as_packed = packed(message)
         if as_packed is not None:
-            peer.send(as_packed, *(self.load if of_load else self.vehicle), self._signing, now)
+            peer.send(as_packed, *(sender or self.vehicle), self._signing, now)
 
     def broadcast(self, message: Any, now: float) -> None:
         """A message to every peer."""

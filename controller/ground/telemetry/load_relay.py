@@ -49,7 +49,7 @@ class LoadRelay:
             last = self._sent.get((peer.address, message_id), -math.inf)
             if time > last and now - last >= 0.999 / _RATES[message_id]:
                 self._sent[peer.address, message_id] = now
-                out.send(peer, message, now, of_load=True)
+                out.send(peer, message, now, out.load)
 
     def as_traffic(self, now: float) -> Any:
         """ADSB_VEHICLE for the load, which QGroundControl draws no other way; None while it is silent."""

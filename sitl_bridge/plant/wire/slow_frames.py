@@ -20,6 +20,7 @@ from sitl_bridge.frames import (
     MILLIAMPERE_HOURS_PER_AMPERE_HOUR,
     MILLIMETRES_PER_METRE,
     PERCENT,
+    STANDARD_GRAVITY,
     LocalOrigin,
     enu_to_ned,
     flu_to_frd,
@@ -114,7 +115,7 @@ def winch_status(time_usec: int, reel: Reel, winch: Winch) -> Any:
         time_usec=time_usec,
         line_length=reel.length,
         speed=reel.rate,
-        tension=reel.tension,
+        tension=reel.tension / STANDARD_GRAVITY,  # kg
         voltage=math.nan,
         current=math.nan,
         temperature=NOT_KNOWN_INT16,

@@ -37,7 +37,7 @@ class Report(NamedTuple):
     speed: float
     """m/s, positive pays out"""
     tension: float
-    """N"""
+    """kg, as the message has it"""
     status: int
     """MAV_WINCH_STATUS_FLAG"""
 
