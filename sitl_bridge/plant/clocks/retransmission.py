@@ -1,4 +1,7 @@
-"""How long to wait for an answer before a tick is sent again: RFC 6298, with a floor in round trips.
+"""How long to wait for an answer before a tick is sent again: RFC 6298's smoothed round trip, times ten.
+
+The RFC's own time-out, the smoothed round trip and four variations, is always shorter: from its first sample
+on, the variation never exceeds twice the smoothed round trip. So it is not kept.
 
 Karn's algorithm: an answer to a repeated tick may belong to any of its sendings, so it is no sample. The
 time-out doubles with each repeat and stays doubled until there is a sample again. Otherwise a round trip that
@@ -11,34 +14,30 @@ FIRST_TIMEOUT = 0.005
 """s, before the first sample."""
 LONGEST_TIMEOUT = 0.5
 """s"""
-FEWEST_ROUND_TRIPS = 10.0
-"""Smoothed round trips in the shortest time-out: the processes share their cores with others."""
+ROUND_TRIPS = 10.0
+"""Smoothed round trips in a time-out: the processes share their cores with others."""
 _MOST_DOUBLINGS = 16
 
 
 class RetransmissionTimer:
-    """Smoothed round trip and its variation, in s."""
+    """Smoothed round trip, s, and how often the time-out was doubled."""
 
     def __init__(self) -> None:
         self._smoothed: float | None = None
-        self._variation = 0.0
         self._doublings = 0
 
     def timeout(self) -> float:
         """s to wait for the answer to what is sent now."""
-        base = FIRST_TIMEOUT
-        if self._smoothed is not None:
-            base = max(FEWEST_ROUND_TRIPS * self._smoothed, self._smoothed + 4.0 * self._variation)
+        base = FIRST_TIMEOUT if self._smoothed is None else ROUND_TRIPS * self._smoothed
         return min(LONGEST_TIMEOUT, base * 2.0**self._doublings)
 
     def sample(self, round_trip: float) -> None:
         """The answer to a tick that was sent once came after `round_trip` s."""
         self._doublings = 0
         if self._smoothed is None:
-            self._smoothed, self._variation = round_trip, 0.5 * round_trip
-            return
-        self._variation += 0.25 * (abs(self._smoothed - round_trip) - self._variation)
-        self._smoothed += 0.125 * (round_trip - self._smoothed)
+            self._smoothed = round_trip
+        else:
+            self._smoothed += 0.125 * (round_trip - self._smoothed)
 
     def expired(self) -> None:
         """No answer came in time."""

@@ -95,6 +95,15 @@ def test_an_answer_to_an_older_tick_ends_freewheeling_and_the_current_one_is_wai
     assert c.send_when_due() == [b"tick 2"]
 
 
+def test_a_datagram_without_an_answer_does_not_end_freewheeling() -> None:
+    c = Clock()
+    c.send()
+    c.clock.receive(b"garbage", c.now)
+    c.clock.receive(c.answers.packer.pack(_command()), c.now)
+    assert c.simulation.done == [("message", 76)]
+    assert c.send(PERIOD) == [b"reply 76", b"tick 2"]
+
+
 def test_an_unarmed_answer_goes_on_and_begins_nothing() -> None:
     c = Clock()
     c.send()
