@@ -61,7 +61,7 @@ def test_the_workflow_is_one() -> None:
     run = [step["run"] for step in steps if "run" in step]
     assert run.index("sitl warmup") < run.index("pytest")
     [python] = [step for step in steps if step.get("uses", "").startswith("actions/setup-python@")]
-    assert "cache" not in python["with"]  # it fails in a repository without requirements.txt or pyproject.toml
+    assert "cache" not in python["with"]  # which fails in a repository without requirements.txt
     assert all(re.fullmatch(r"[\w-]+/[\w-]+@v\d+", step["uses"]) for step in steps if "uses" in step)
 
 
