@@ -40,7 +40,7 @@ def _flights_per_minute(workers: int) -> float:
     """Of `setpoint` with loads of different mass, once each worker has flown its first."""
     from sitl.studies.sweep.cluster import as_they_come, cluster
     from sitl.studies.sweep.draws import draws
-    from sitl.studies.sweep.run import batches_of, fly_batch
+    from sitl.studies.sweep.run import batches_of, fly_batch, lost_row
     from sitl.studies.sweep.study import Study, Vary
 
     varied = Vary(key="load.mass", low=1.0, high=20.0, steps=SWEPT)
@@ -50,7 +50,7 @@ def _flights_per_minute(workers: int) -> float:
     with cluster(workers, needed_by="sitl bench") as client:
         client.run(fly_batch, batches[0][:1], plain, "")
         began = time.perf_counter()
-        for _ in as_they_come(client, fly_batch, batches, plain, ""):
+        for _ in as_they_come(client, fly_batch, batches, plain, "", lost=lost_row):
             pass
         taken = time.perf_counter() - began
     return 60.0 * sum(map(len, batches)) / taken

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Generator, Iterable, Iterator
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from typing import Any
 
+from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import DescriptionError
+
+LOOK_INTERVAL = 0.02
+"""s, between two looks at what is ready."""
 
 
 @contextlib.contextmanager
@@ -31,7 +36,7 @@ def cluster(workers: int | None = None, scheduler: str | None = None, needed_by:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             host="127.0.0.1",
             silence_logs=50,
         ) as local,
@@ -41,17 +46,52 @@ def cluster(workers: int | None = None, scheduler: str | None = None, needed_by:
 
 
 def as_they_come(
-    client: Any, function: Callable[..., Any], batches: Iterable[Any], *more: Any
-) -> Generator[Any, None, None]:
-    """What function(batch, *more) returns in the workers, as each is ready.
+    client: Any,
+    function: Callable[..., list[Any]],
+    batches: Iterable[Sequence[Any]],
+    *more: Any,
+    lost: Callable[[Any], Any],
+    stop: StopRequest | None = None,
+) -> Generator[list[Any], None, None]:
+    """What function(batch, *more) returns in the workers, a list of an element each, as it is ready.
 
-    A batch whose worker dies is flown again by another one. What is left when the caller stops is cancelled.
+    A batch whose worker dies goes to another one. If workers die of it again and again, its elements are
+    tried in the end, one at a time with nothing else in the cluster; of one that still kills its workers
+    comes lost(element). Ends when all is there, or soon after a request to stop; what is left then is
+    cancelled.
     """
-    from distributed import as_completed
+    suspects: list[Any] = []
+    for batch, found in _results(client, function, batches, more, stop):
+        if found is None:
+            suspects += batch
+        else:
+            yield found
+    for suspect in suspects:
+        for _, found in _results(client, function, [[suspect]], more, stop):
+            yield [lost(suspect)] if found is None else found
 
-    futures = [client.submit(function, batch, *more, pure=False) for batch in batches]
+
+def _results(
+    client: Any,
+    function: Callable[..., list[Any]],
+    batches: Iterable[Sequence[Any]],
+    more: tuple[Any, ...],
+    stop: StopRequest | None,
+) -> Generator[tuple[Sequence[Any], list[Any] | None], None, None]:
+    """Each batch with what became of it; None: its workers died."""
+    from distributed import KilledWorker, as_completed
+
+    of = {client.submit(function, batch, *more, pure=False): batch for batch in batches}
+    coming = as_completed(of)
     try:
-        for future in as_completed(futures):
-            yield future.result()
+        while coming.count() and not stop:
+            if not (done := coming.next_batch(block=False)):
+                time.sleep(LOOK_INTERVAL)
+            for future in done:
+                batch = of.pop(future)
+                try:
+                    yield batch, future.result()
+                except KilledWorker:
+                    yield batch, None
     finally:
-        client.cancel(futures)
+        client.cancel(list(of))

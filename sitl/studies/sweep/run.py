@@ -81,7 +81,8 @@ def _fly(
         progress = _Progress(len(missing))
         written_at = time.monotonic()
         arguments = study.model_dump(mode="json"), str(options.out)
-        coming = as_they_come(client, fly_batch, batches_of(missing), *arguments)
+        batches = batches_of(missing)
+        coming = as_they_come(client, fly_batch, batches, *arguments, stop=stop, lost=lost_row)
         try:
             for rows in coming:
                 known |= {row[IDENTITY]: row for row in rows}
@@ -90,13 +91,12 @@ def _fly(
                 if time.monotonic() - written_at > WRITE_INTERVAL:
                     write_rows(options.out, unwritten)
                     unwritten, written_at = [], time.monotonic()
-                if stop:
-                    _say(f"stopped by {stop.reason}; the same command goes on from here")
-                    break
         finally:
             write_rows(options.out, unwritten)
             coming.close()
         progress.end()
+        if stop:
+            _say(f"stopped by {stop.reason}; the same command goes on from here")
     return known
 
 
@@ -111,9 +111,17 @@ def fly_batch(batch: list[dict[str, Any]], study: dict[str, Any], out: str) -> l
     rows = []
     for draw in batch:
         logs = None if study["logs"] == "none" else str(Path(out) / "logs" / draw["identity"])
-        row = fly_draw(study, draw["inputs"], logs)
-        rows.append({IDENTITY: draw["identity"], **draw["inputs"], **row, "versions": _versions()})
+        rows.append(_row(draw, fly_draw(study, draw["inputs"], logs)))
     return rows
+
+
+def lost_row(draw: dict[str, Any]) -> dict[str, Any]:
+    """The row of a flight that no worker came back from."""
+    return _row(draw, {"outcome": "raised", "outcome_cause": "its worker was killed, again and again"})
+
+
+def _row(draw: dict[str, Any], flown: dict[str, Any]) -> dict[str, Any]:
+    return {IDENTITY: draw["identity"], **draw["inputs"], **flown, "versions": _versions()}
 
 
 @cache
