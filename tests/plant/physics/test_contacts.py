@@ -188,6 +188,8 @@ def test_aloft_the_anchor_is_under_the_point() -> None:
     assert slipped(-0.1, 0.0, 7.0, 8.0) == (7.0, 8.0)
     assert slipped(0.0, 0.0, 7.0, 8.0) == (7.0, 8.0)
     assert slipped(0.1, 2.0, 7.0, 8.0) == (7.0, 8.0)  # rises so fast that the ground does not push
+    assert slipped(0.1, 2.01, 7.0, 8.0) == (7.0, 8.0)
+    assert slipped(-0.1, 3.0, 7.0, 8.0) == (7.0, 8.0)
     assert slipped(0.1, 1.99, 7.0, 8.0) != (7.0, 8.0)
 
 

@@ -314,10 +314,10 @@ def test_the_load_is_fenced_in_too_while_it_hangs() -> None:
     ],
 )
 def test_a_battery_runs_down(action: int, critical: Reaction, emergency: Reaction) -> None:
-    watched = Watched(COM_LOW_BAT_ACT=action, BAT_LOW_THR=0.25, BAT_CRIT_THR=0.125, BAT_EMERGEN_THR=0.0625)
+    watched = Watched(COM_LOW_BAT_ACT=action, BAT_LOW_THR=0.75, BAT_CRIT_THR=0.125, BAT_EMERGEN_THR=0.0625)
     words = {Reaction.NONE: "warning only", Reaction.LAND: "landing", Reaction.RETURN: "returning"}
     steps = [
-        (0.25, 0.24, WARNING, "24 %: low", Reaction.NONE),
+        (0.75, 0.72, WARNING, "72 %: low", Reaction.NONE),
         (0.125, 0.12, CRITICAL, "12 %: critical", critical),
         (0.0625, 0.06, EMERGENCY, "6 %: emergency", emergency),
     ]
