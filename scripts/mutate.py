@@ -18,6 +18,7 @@ import ast
 import contextlib
 import difflib
 import importlib
+import json
 import os
 import random
 import re
@@ -49,6 +50,7 @@ OPERATORS = re.compile(
     r"|ZeroIterationForLoop)"
 )
 """No operator that only makes what no type checker would let pass, as `+` to `|`."""
+ENTRY = ("where", "before", "after")
 DIFF_CONTEXT = 2
 SPARE_TIME = 30.0
 """s that a mutant may take beyond three times the tests' own time, before it counts as killed"""
@@ -91,10 +93,24 @@ class Mutant(NamedTuple):
         lines = (text.splitlines() for text in (self.before, self.after))
         return "\n".join([*difflib.unified_diff(*lines, self.file, self.file, "", "", DIFF_CONTEXT, "")][1:])
 
-    def changed(self) -> tuple[str, str]:
-        """The changed lines as they were and as they are, without indentation."""
-        diff = list(difflib.ndiff(self.before.splitlines(), self.after.splitlines()))
-        return tuple(" ".join(line[2:].strip() for line in diff if line[0] == sign) for sign in "-+")  # type: ignore[return-value]
+    def entry(self) -> dict[str, str]:
+        """Function and changed line as they are named in tests/mutation.toml."""
+        before, after = self.before.splitlines(), self.after.splitlines()
+        first = next(i for i, (one, other) in enumerate(zip(before, after, strict=False)) if one != other)
+        return {
+            "where": _function_at(ast.parse(self.before), first + 1),
+            "before": before[first].strip(),
+            "after": after[first].strip(),
+        }
+
+
+def _function_at(tree: ast.AST, line: int) -> str:
+    """Name of the innermost function or class around a line; empty if there is none."""
+    name = ""
+    for node in ast.walk(tree):  # outer ones come first
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.lineno <= line <= (node.end_lineno or 0):
+            name = node.name
+    return name
 
 
 def mutants(root: Path, files: list[str], sample: int, seed: int) -> Iterator[Mutant]:
@@ -237,14 +253,23 @@ def examine(root: Path, name: str, module: dict[str, Any], sample: int, seed: in
     """Mutate a module; returns its line of the table."""
     tests = Tests(root, module["tests"], root / "log")
     print(f"{name}: the tests take {tests.duration:.1f} s", flush=True)
-    reasons = {(known["before"], known["after"]): known["reason"] for known in module.get("survivor", [])}
+    known = {tuple(entry[key] for key in ENTRY): entry["reason"] for entry in module.get("survivor", [])}
     survived, count = [], 0
     for mutant in mutants(root, module["files"], sample, seed):
         count += 1
         put(root, mutant.file, mutant.after)
         if tests.pass_():
-            survived.append(reasons.get(mutant.changed(), ""))
-            print(f"survived: {mutant.diff()}\nreason: {survived[-1] or 'none is known'}\n", flush=True)
+            entry = mutant.entry()
+            survived.append(known.get(tuple(entry[key] for key in ENTRY), ""))
+            print(f"survived: {mutant.diff()}", flush=True)
+            if survived[-1]:
+                print(f"reason: {survived[-1]}\n", flush=True)
+            else:
+                lines = [
+                    f"[[module.{name}.survivor]]",
+                    *(f"{key} = {json.dumps(entry[key])}" for key in ENTRY),
+                ]
+                print("\n".join([*lines, 'reason = ""\n']), flush=True)
         put(root, mutant.file, mutant.before)
     killed = count - len(survived)
     share = 100 * killed / max(1, count)
