@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.fence_zones import Zone, outside
+from controller.ground.flight.fence_zones import Zone, crosses, outside
 from tests.ground.in_flight import flying
 from tests.ground.rig import Client, Rig
 from tests.ground.test_missions import ACCEPTED, Uploader, download, same, waypoint
@@ -139,6 +139,66 @@ def test_return_goes_where_rtl_type_says(kind: int, place: tuple[float, float]) 
     assert client.command(20).result == 0
     rig.run_until(lambda: not rig.station.armed, 200)
     assert rig.view.load_position[:2] == pytest.approx(place, abs=1.1)  # the load lay a metre from home
+
+
+def test_a_circle_without_a_radius_is_no_zone() -> None:
+    """MAVSDK-Python's examples/geofence.py sends one beside its polygon."""
+    rig = Rig()
+    client = rig.client()
+    items = [*square(9), at(5003, -2e6, 0, 0.0)]
+    uploaded(rig, client, items)
+    assert same(download(client, plan=FENCE), items)
+    assert Uploader(client, [waypoint(5, 5)]).run() == ACCEPTED
+    uploaded(rig, client, items[4:])
+    assert Uploader(client, [waypoint(50, 5)]).run() == ACCEPTED
+
+
+@pytest.mark.parametrize("zone", [square(3, inclusion=False, north=20), [at(5004, 20, 0, 3.0)]])
+def test_a_plan_whose_way_crosses_an_exclusion_zone_is_taken_with_a_warning(zone: Any) -> None:
+    rig = Rig()
+    client = rig.client()
+    warning = "The way to mission item 1 crosses exclusion zone 0 of the geofence"
+    uploaded(rig, client, zone)
+    assert Uploader(client, [waypoint(0, 10), waypoint(40, -10)]).run() == ACCEPTED
+    assert warning in client.texts()
+    client.clear()
+    assert Uploader(client, [waypoint(0, 10), waypoint(40, 10)]).run() == ACCEPTED
+    assert not client.texts()
+    uploaded(rig, client, [])
+    assert Uploader(client, [waypoint(0, 10), waypoint(40, -10)]).run() == ACCEPTED
+    assert not client.texts()
+    uploaded(rig, client, zone)  # the other order: QGroundControl sends the fence after the mission
+    rig.run(0.1)
+    assert warning in client.texts()
+
+
+PLACES = st.tuples(st.floats(-9, 9), st.floats(-9, 9))
+
+
+@given(
+    PLACES,
+    PLACES,
+    st.sampled_from(
+        [
+            Zone(False, ((-3.0, -3.0), (-3.0, 3.0), (3.0, 3.0), (3.0, -3.0)), 0.0),
+            Zone(False, ((1.0, 1.0),), 4.0),
+        ]
+    ),
+)
+def test_a_way_crosses_a_zone_that_holds_one_of_its_points(a: Any, b: Any, zone: Zone) -> None:
+    points = [(a[0] + s * (b[0] - a[0]), a[1] + s * (b[1] - a[1])) for s in (i / 200 for i in range(201))]
+    if any(zone.contains(point) for point in points):
+        assert crosses(zone, a, b)
+    elif crosses(zone, a, b):  # a corner or rim between two of the points
+        assert min(math.dist(p, q) for p in points for q in _rim(zone)) < 0.2
+
+
+def _rim(zone: Zone) -> list[tuple[float, float]]:
+    if zone.radius > 0:
+        east, north = zone.corners[0]
+        turns = [i / 360 * math.tau for i in range(360)]
+        return [(east + zone.radius * math.cos(t), north + zone.radius * math.sin(t)) for t in turns]
+    return [(x, y) for x in (-3.0, 3.0) for y in (-3.0, 3.0)]
 
 
 def test_the_capabilities_say_fence_and_rally() -> None:

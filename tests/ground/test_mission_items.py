@@ -44,7 +44,40 @@ def test_items_for_missing_hardware_are_accepted_named_once_and_passed(what: str
 def test_marks_and_delays_are_passed() -> None:
     items = [waypoint(3, 0), other(189), other(114, 5.0), other(112, 1.0), waypoint(3, 3)]
     rig = Rig()
+    assert flown(rig, rig.client(), items) == [0, 4]
+
+
+@pytest.mark.parametrize(("condition", "amount"), [(112, 3.0), (114, 12.0)])
+def test_a_condition_holds_back_what_follows_and_not_the_flight(condition: int, amount: float) -> None:
+    """CONDITION_DELAY in s, CONDITION_DISTANCE in m to the place ahead; then a speed, and the next place."""
+    items = [waypoint(3, 0, radius=1.0), other(condition, amount), other(178, 1.0, 3.0), waypoint(40, 0)]
+    rig, _ = started(items)
+    mission = rig.station.machine.mission
+    rig.run_until(lambda: mission.current == 3)
+    began, speed = rig.now, mission.speed
+    assert math.isnan(speed)
+    rig.run_until(lambda: mission.speed == 3.0, 40.0)
+    assert mission.current == 3
+    if condition == 112:
+        assert rig.now - began == pytest.approx(amount, abs=0.1)
+        assert rig.view.position[1] > 5.0  # it did not wait
+    else:
+        assert 40.0 - rig.view.position[1] == pytest.approx(amount, abs=0.5)
+
+
+def test_what_a_condition_holds_back_too_long_is_skipped() -> None:
+    items = [waypoint(3, 0), other(112, 1e6), other(178, 1.0, 3.0), waypoint(9, 0), waypoint(9, 3)]
+    rig = Rig()
     assert flown(rig, rig.client(), items) == [0, 3, 4]
+    assert math.isnan(rig.station.machine.mission.speed)
+
+
+def test_a_delay_without_a_place_to_go_to_is_waited_for() -> None:
+    rig, _ = started([waypoint(3, 0), other(112, 5.0)])
+    rig.run_until(lambda: rig.station.machine.mission.current == 1)
+    began = rig.now
+    rig.run_until(lambda: rig.station.machine.mode.name == "HOLD")
+    assert rig.now - began == pytest.approx(5.0, abs=0.1)
 
 
 def test_loiter_to_altitude_ends_at_the_altitude() -> None:

@@ -32,6 +32,35 @@ class Zone(NamedTuple):
         return inside
 
 
+def crosses(zone: Zone, start: Place, end: Place) -> bool:
+    """Whether the straight way from a place to another goes through a zone, or along its side."""
+    if zone.contains(start) or zone.contains(end):
+        return True
+    if zone.radius > 0:
+        return _distance(zone.corners[0], start, end) <= zone.radius
+    corners = zone.corners
+    return any(_meet(start, end, corners[i - 1], corners[i]) for i in range(len(corners)))
+
+
+def _distance(point: Place, start: Place, end: Place) -> float:
+    """m, from a point to the nearest of a straight way."""
+    east, north = end[0] - start[0], end[1] - start[1]
+    square = east * east + north * north
+    along = (point[0] - start[0]) * east + (point[1] - start[1]) * north
+    share = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return math.dist(point, (start[0] + share * east, start[1] + share * north))
+
+
+def _meet(a: Place, b: Place, c: Place, d: Place) -> bool:
+    """Whether the straight ways from a to b and from c to d have a point in common."""
+    return _side(a, b, c) * _side(a, b, d) <= 0.0 and _side(c, d, a) * _side(c, d, b) <= 0.0
+
+
+def _side(a: Place, b: Place, point: Place) -> float:
+    """Positive to the left of the way from a to b, m²."""
+    return (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0])
+
+
 def outside(zones: tuple[Zone, ...], place: Place) -> str:
     """Why a place is not allowed, or an empty string; one inclusion of several is enough, as on PX4."""
     for index, zone in enumerate(zones):

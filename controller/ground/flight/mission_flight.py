@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.ground.flight.conditions import CONDITIONS, HeldBack, section_after
 from controller.ground.flight.payload.gripper import GRAB, PATIENCE, RELEASE
 from controller.ground.flight.payload.payload import DELIVER, Payload
 from controller.ground.flight.region_of_interest import RegionOfInterest
@@ -39,6 +40,8 @@ ACTIVE: int = mavlink.MISSION_STATE_ACTIVE
 PAUSED: int = mavlink.MISSION_STATE_PAUSED
 COMPLETE: int = mavlink.MISSION_STATE_COMPLETE
 
+Place = Callable[[Item], Triple]
+SetHome = Callable[[Triple], None]
 MOST_STEPS = 1000
 """Items without a place that are passed in one go; more are a loop that goes nowhere."""
 _WITH_HEADING = (WAYPOINT, LOITER, LOITER_TIME, TAKEOFF, LAND)
@@ -90,7 +93,8 @@ class MissionFlight:
         self._since: float | None = None
         self._here: Triple | None = None
         """m, where the vehicle was when an item began that only has a height"""
-        self._arrived = False
+        self._arrived = self._refused = self._placing = False
+        self._held_back: HeldBack | None = None
 
     def jump(self, seq: int) -> str:
         """Go on with another item; returns why not, or an empty string.
@@ -129,10 +133,10 @@ class MissionFlight:
     def advance(
         self,
         view: VehicleView,
-        place: Callable[[Item], Triple],
+        place: Place,
         hanging: float,
         radius: float,
-        set_home: Callable[[Triple], None],
+        set_home: SetHome,
     ) -> Waypoint | Then:
         """What to do now. `hanging`: m, the load below the vehicle (0 without); `radius`: m, the default."""
         for _ in range(MOST_STEPS):
@@ -144,56 +148,73 @@ class MissionFlight:
             if item.command == RETURN:
                 self._complete()
                 return Then.RETURN
+            section = section_after(self.items, self.current) if item.command in CONDITIONS else None
             if item.command == JUMP:
                 self._take_jump(item)
-            elif item.command == CHANGE_SPEED:
-                self.speed = item.p2 if item.p1 in (0, 1) and item.p2 > 0 else self.speed
-                self._next()
-            elif item.command == SET_HOME:
-                set_home(view.position if item.p1 == 1 else place(item))
-                self._next()
-            elif item.command in POINTING:
-                self.region.point_at(item, self.items, place)
-                self._next()
-            elif item.command in (GRIPPER, WINCH):
-                done = self._grips if item.command == GRIPPER else self._reels
-                if not done(item, view):
+            elif section is not None:
+                self.current = section.place
+                self._leave()
+                self._held_back = HeldBack(section.held_back, view.time)
+            elif item.command not in (*WITH_POSITION, *DELAYS):
+                if not self._act(item, view, place, set_home):
                     return Waypoint(None, math.nan)
                 self._next()
-            elif item.command not in (*WITH_POSITION, *DELAYS):
-                self._next()
             else:
+                self._act_on_the_way(item, view, place, set_home)
                 stay = self._fly(item, view, place, hanging, radius)
                 if stay is not None:
                     return stay
         return Then.LOST
 
-    def _grips(self, item: Item, view: VehicleView) -> bool:
-        """Whether the gripper has done what an item says, or has been waited for long enough."""
-        gripper = self._payload.gripper
-        if gripper is None or item.p2 not in (RELEASE, GRAB):
-            return True
-        if self._since is None:
-            self._since = view.time
-            gripper.act(int(item.p2))
-        return gripper.done or view.time - self._since >= PATIENCE
+    def _act(self, item: Item, view: VehicleView, place: Place, set_home: SetHome) -> bool:
+        """Do what an item without a place says; whether it is done."""
+        begins, self._since = self._since is None, view.time if self._since is None else self._since
+        if begins:
+            self._begin(item, view, place, set_home)
+        gripper, winch = self._payload.gripper, self._payload.winch
+        if item.command == GRIPPER and gripper is not None and item.p2 in (RELEASE, GRAB):
+            return gripper.done or view.time - self._since >= PATIENCE
+        return item.command != WINCH or winch is None or self._refused or not self._payload.reeling
 
-    def _reels(self, item: Item, view: VehicleView) -> bool:
-        """Whether the winch has done what an item says: a length, a delivery; the rest is done at once."""
-        if self._payload.winch is None:
-            return True
-        if self._since is None:
-            self._since = view.time
-            placing = item.command == PAYLOAD_PLACE
-            action = DELIVER if placing else item.p2
-            verdict = self._payload.work_winch(action, item.p3, item.p4, view)
-            if not verdict.ok:
-                self.refusals.append(f"Mission item {self.current}: {verdict.text}")
-                return True
-        return not self._payload.reeling
+    def _begin(self, item: Item, view: VehicleView, place: Place, set_home: SetHome) -> None:
+        """Begin what an item without a place says; most of it is done at once."""
+        self._refused = False
+        gripper = self._payload.gripper
+        if item.command == CHANGE_SPEED:
+            self.speed = item.p2 if item.p1 in (0, 1) and item.p2 > 0 else self.speed
+        elif item.command == SET_HOME:
+            set_home(view.position if item.p1 == 1 else place(item))
+        elif item.command in POINTING:
+            self.region.point_at(item, self.items, place)
+        elif item.command == GRIPPER and gripper is not None and item.p2 in (RELEASE, GRAB):
+            gripper.act(int(item.p2))
+        elif item.command == WINCH and self._payload.winch is not None:
+            self._reel(item.p2, item.p3, item.p4, view)
+
+    def _act_on_the_way(self, item: Item, view: VehicleView, place: Place, set_home: SetHome) -> None:
+        """Begin those actions that a condition holds back no more."""
+        if self._held_back is not None:
+            point = self._point(item, view, place)
+            distance = 0.0 if point is None else math.dist(view.position, point)
+            for action in self._held_back.due(view.time, distance):
+                self._begin(action, view, place, set_home)
+
+    def _reel(self, action: float, length: float, rate: float, view: VehicleView) -> None:
+        """Tell the winch; what it refuses is said, and passed over."""
+        verdict = self._payload.work_winch(action, length, rate, view)
+        self._refused = not verdict.ok
+        if self._refused:
+            self.refusals.append(f"Mission item {self.current}: {verdict.text}")
+
+    def _places(self, view: VehicleView) -> bool:
+        """At the place of a NAV_PAYLOAD_PLACE: whether the load has been delivered."""
+        if not self._placing:
+            self._placing = True
+            self._reel(DELIVER, math.nan, math.nan, view)
+        return self._refused or not self._payload.reeling
 
     def _fly(
-        self, item: Item, view: VehicleView, place: Callable[[Item], Triple], hanging: float, radius: float
+        self, item: Item, view: VehicleView, place: Place, hanging: float, radius: float
     ) -> Waypoint | Then | None:
         """An item that takes time; None when it is over."""
         point = self._point(item, view, place)
@@ -212,7 +233,7 @@ class MissionFlight:
             self._arrived = True
         if self._arrived:
             if item.command == PAYLOAD_PLACE and self._payload.delivers:
-                return self._over(item) if self._reels(item, view) else Waypoint(None, math.nan)
+                return self._over(item) if self._places(view) else Waypoint(None, math.nan)
             self._since = view.time if self._since is None else self._since
             if view.time - self._since >= wait:
                 return self._over(item)
@@ -226,7 +247,7 @@ class MissionFlight:
             return pointed
         return yaw_from_heading(math.radians(item.p4))
 
-    def _point(self, item: Item, view: VehicleView, place: Callable[[Item], Triple]) -> Triple | None:
+    def _point(self, item: Item, view: VehicleView, place: Place) -> Triple | None:
         """Where the vehicle has to be for an item, m ENU; None: where it is."""
         if item.has_place:
             return place(item)
@@ -266,8 +287,8 @@ class MissionFlight:
         self._leave()
 
     def _leave(self) -> None:
-        self._here = None
-        self._arrived = False
+        self._here = self._held_back = None
+        self._arrived = self._placing = False
         self._since = None
 
 

@@ -60,6 +60,7 @@ from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Term
 from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import WAYPOINT
+from controller.ground.missions.legs import crossed_zones
 from controller.ground.missions.mission_plan import Fault, Item
 from controller.ground.missions.zones import rally_points_of, zones_of
 from controller.ground.parameters.protocol import Parameters
@@ -72,6 +73,8 @@ _SEVERITY_OF_MODE = {mode: reaction for reaction, mode in _REACTION_MODES.items(
 
 _SAME_HEIGHT = 1.0
 """m, by which the altitude of a home may differ from the ground's without a word"""
+_MOST_WARNINGS = 5
+"""Of zones that one plan crosses"""
 _LIFTS = 0.3
 """m, above a vehicle on the ground, from which on a set-point asks for a take-off"""
 
@@ -383,6 +386,7 @@ class Machine:
             return fault
         for text in plan.remarks(items, self.profile, self.home_geodetic(), self._guidance.fence()):
             self.say(INFO, text)
+        self._warn_of_zones(items)
         self.mission.replace(items)
         if self.armed and self.mode is Mode.MISSION:
             if items:
@@ -399,7 +403,15 @@ class Machine:
         if isinstance(zones, Fault):
             return zones
         self._guidance.zones = zones
+        self._warn_of_zones(self.mission.items)
         return None
+
+    def _warn_of_zones(self, items: tuple[Item, ...]) -> None:
+        """Say which ways of a plan cross an exclusion zone."""
+        guidance, home = self._guidance, self.home_geodetic()
+        texts = crossed_zones(items, self.profile.origin, home, guidance.fence(), guidance.zones)
+        for text in texts[:_MOST_WARNINGS]:
+            self.say(WARNING, text)
 
     def accept_rally(self, items: tuple[Item, ...]) -> Fault | None:
         """Take rally points, or say why not."""

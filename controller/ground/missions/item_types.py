@@ -14,6 +14,7 @@ TAKEOFF: int = mavlink.MAV_CMD_NAV_TAKEOFF
 PAYLOAD_PLACE: int = mavlink.MAV_CMD_NAV_PAYLOAD_PLACE
 DELAY: int = mavlink.MAV_CMD_NAV_DELAY
 CONDITION_DELAY: int = mavlink.MAV_CMD_CONDITION_DELAY
+CONDITION_DISTANCE: int = mavlink.MAV_CMD_CONDITION_DISTANCE
 GRIPPER: int = mavlink.MAV_CMD_DO_GRIPPER
 WINCH: int = mavlink.MAV_CMD_DO_WINCH
 JUMP: int = mavlink.MAV_CMD_DO_JUMP
@@ -72,7 +73,7 @@ WITHOUT_EFFECT: dict[int, str] = {
 """Commands for hardware that is not there, with its name"""
 _MARKS = (
     mavlink.MAV_CMD_DO_LAND_START,
-    mavlink.MAV_CMD_CONDITION_DISTANCE,
+    CONDITION_DISTANCE,
     mavlink.MAV_CMD_CONDITION_GATE,
 )
 """What they hold back has no effect here, or they only mark a place in the plan"""

@@ -31,10 +31,11 @@ def zones_of(items: tuple[Item, ...], origin: LocalOrigin) -> tuple[Zone, ...] |
         if fault := _place_fault(item, index, "Geofence"):
             return fault
         if item.command in _CIRCLES:
-            if not (math.isfinite(item.p1) and item.p1 > 0):
-                text = f"Geofence item {index}: radius {item.p1:g} m; use more than 0"
+            if not (math.isfinite(item.p1) and item.p1 >= 0):
+                text = f"Geofence item {index}: radius {item.p1:g} m; use 0 (no zone) or more"
                 return Fault(mavlink.MAV_MISSION_INVALID_PARAM1, text)
-            zones.append(Zone(_CIRCLES[item.command], (_place(item, origin),), item.p1))
+            if item.p1 > 0:  # MAVSDK's example sends a circle without a radius where it means none
+                zones.append(Zone(_CIRCLES[item.command], (_place(item, origin),), item.p1))
             index += 1
         elif item.command in _POLYGONS:
             corners = items[index : index + int(item.p1)] if 3 <= item.p1 <= len(items) else ()
