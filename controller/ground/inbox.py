@@ -15,9 +15,9 @@ from controller.ground.files.ftp import Client as FtpClient
 from controller.ground.files.ftp import Ftp
 from controller.ground.files.logs import MESSAGES as LOG_MESSAGES
 from controller.ground.files.logs import LogProtocol
-from controller.ground.flight.geometry import hanging_load
 from controller.ground.flight.modes import Machine
-from controller.ground.flight.sticks import axes_of
+from controller.ground.flight.motion.geometry import hanging_load
+from controller.ground.flight.motion.sticks import axes_of
 from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import Packed
 from controller.ground.link.peers import Peer, Peers

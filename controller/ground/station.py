@@ -17,8 +17,8 @@ from controller.ground.files.logs import LogProtocol, LogStore, NoLogs
 from controller.ground.files.virtual import VirtualFiles
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
+from controller.ground.flight.motion.setpoint_types import Target
 from controller.ground.flight.px4_modes import Mode
-from controller.ground.flight.setpoint_types import Target
 from controller.ground.inbox import Inbox
 from controller.ground.link.datagrams import DatagramSplitter
 from controller.ground.link.outbox import Outbox

@@ -15,8 +15,7 @@ from pymavlink.dialects.v20 import common
 from controller.design.catalogue import EVEN, Emphasis, guided_designs
 from controller.feedback.assessment import Assessor, Contact, ExactAssessor
 from controller.ground.commands.result import INFO, WARNING, Notice
-from controller.ground.flight.payload.winch import Report
-from controller.ground.flight.setpoint_types import (
+from controller.ground.flight.motion.setpoint_types import (
     Attitude,
     Body,
     Follow,
@@ -26,7 +25,8 @@ from controller.ground.flight.setpoint_types import (
     Target,
     Terminate,
 )
-from controller.ground.flight.trajectory import Limits, Trajectory, motion_pole
+from controller.ground.flight.motion.trajectory import Limits, Trajectory, motion_pole
+from controller.ground.flight.payload.winch import Report
 from controller.ground.link.packing import decoded
 from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import VehicleView

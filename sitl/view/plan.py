@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.ground.flight.fence_zones import Zone
+from controller.ground.flight.limits.fence_zones import Zone
 from controller.ground.missions.mission_plan import Fault, Item, place
 from controller.ground.missions.zones import rally_points_of, zones_of
 from sitl_bridge.frames import LocalOrigin, Triple

@@ -10,8 +10,8 @@ import pytest
 from scipy import signal
 
 from controller.design.catalogue import guided_designs
-from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
-from controller.ground.flight.trajectory import (
+from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto, Land
+from controller.ground.flight.motion.trajectory import (
     FASTEST_POLE,
     MOST_JERK,
     Limits,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from controller.ground.flight.setpoint_types import (
+from controller.ground.flight.motion.setpoint_types import (
     Attitude,
     Body,
     Follow,

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Idle
+from controller.ground.flight.motion.setpoint_types import Idle
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.in_flight import ACCEPTED, REJECTED
 from tests.ground.rig import NAN, Rig

@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.guidance import Stage
-from controller.ground.flight.setpoint_types import Attitude, Idle
+from controller.ground.flight.motion.setpoint_types import Attitude, Idle
 from controller.ground.telemetry.plant_clock import PlantClock
 from sitl_bridge.frames import (
     Triple,

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Body, Goto, Idle, Land, Terminate
+from controller.ground.flight.motion.setpoint_types import Body, Goto, Idle, Land, Terminate
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import LocalOrigin
 from tests.ground.in_flight import ACCEPTED, DENIED, REJECTED, flying

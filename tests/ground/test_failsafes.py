@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Idle, Terminate
+from controller.ground.flight.motion.setpoint_types import Idle, Terminate
 from controller.ground.link.peers import SILENCE
 from sitl_bridge.frames import quaternion_from_euler
 from tests.ground.in_flight import ACCEPTED, flying, local_setpoint, mode, set_parameter, stream

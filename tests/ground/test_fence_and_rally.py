@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.fence_zones import Zone, crosses, outside
+from controller.ground.flight.limits.fence_zones import Zone, crosses, outside
 from tests.ground.in_flight import flying
 from tests.ground.rig import Client, Rig
 from tests.ground.test_missions import ACCEPTED, Uploader, download, same, waypoint

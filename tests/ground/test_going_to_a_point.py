@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Idle
-from controller.ground.flight.trajectory import stopping_distance
+from controller.ground.flight.motion.setpoint_types import Idle
+from controller.ground.flight.motion.trajectory import stopping_distance
 from tests.ground.in_flight import ACCEPTED, DENIED, REJECTED, flying
 from tests.ground.kinematic import PROFILE, ZURICH
 from tests.ground.rig import NAN, Rig

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from controller.ground.flight.setpoint_types import Body, Goto
+from controller.ground.flight.motion.setpoint_types import Body, Goto
 from tests.ground.flown import Flown
 from tests.ground.in_flight import ACCEPTED, HOME_HEIGHT, flying, local_setpoint, mode, stream
 from tests.ground.kinematic import ZURICH

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.trajectory import stopping_distance
+from controller.ground.flight.motion.trajectory import stopping_distance
 from tests.ground.in_flight import flying
 from tests.ground.kinematic import ZURICH
 from tests.ground.rig import Channel, Client, Rig

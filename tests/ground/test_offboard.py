@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from controller.ground.flight.setpoint_types import Follow, Idle
-from controller.ground.flight.trajectory import stopping_distance
+from controller.ground.flight.motion.setpoint_types import Follow, Idle
+from controller.ground.flight.motion.trajectory import stopping_distance
 from controller.ground.telemetry.vehicle_state import profile_of
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.ground.in_flight import ACCEPTED, REJECTED, flying, local_setpoint, mode, stream

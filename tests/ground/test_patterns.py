@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.patterns import LARGEST_ACCELERATION
+from controller.ground.flight.motion.patterns import LARGEST_ACCELERATION
 from controller.ground.link.packing import FigureEightStatus
 from tests.ground.flown import Flown
 from tests.ground.in_flight import ACCEPTED, DENIED, REJECTED, flying, mode, set_parameter

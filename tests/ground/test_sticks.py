@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Follow, Idle
+from controller.ground.flight.motion.setpoint_types import Follow, Idle
 from tests.ground.flown import Flown
 from tests.ground.in_flight import (
     ACCEPTED,

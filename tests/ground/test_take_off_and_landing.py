@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.guidance import Stage
-from controller.ground.flight.setpoint_types import Body, Goto
+from controller.ground.flight.motion.setpoint_types import Body, Goto
 from tests.ground.in_flight import (
     ACCEPTED,
     DENIED,

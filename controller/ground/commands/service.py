@@ -9,7 +9,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.commands.commands import Command, Key, Memory, Requests, command_of, execute
+from controller.ground.commands.command import Command, Requests, command_of
+from controller.ground.commands.commands import execute
+from controller.ground.commands.memory import Key, Memory
 from controller.ground.commands.plant_commands import Answer, PlantCommands
 from controller.ground.commands.result import INFO, WARNING, Notice, Verdict
 from controller.ground.flight.modes import Machine

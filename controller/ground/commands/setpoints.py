@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Attitude
+from controller.ground.flight.motion.setpoint_types import Attitude
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import (
     DEG_E7_PER_DEG,

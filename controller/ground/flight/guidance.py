@@ -12,13 +12,11 @@ from typing import Protocol
 
 from controller.ground.commands.result import INFO, WARNING
 from controller.ground.commands.setpoints import Setpoint
-from controller.ground.flight.ascent import Ascent, Step
-from controller.ground.flight.descent import Descent
-from controller.ground.flight.descent import Step as DescentStep
-from controller.ground.flight.fence import Fence, fence_around
-from controller.ground.flight.fence_zones import Place, Zone
-from controller.ground.flight.follow_target import FollowTarget
-from controller.ground.flight.geometry import (
+from controller.ground.flight.limits.fence import Fence, fence_around
+from controller.ground.flight.limits.fence_zones import Place, Zone
+from controller.ground.flight.mission_flight import MissionFlight, Then
+from controller.ground.flight.motion.follow_target import FollowTarget
+from controller.ground.flight.motion.geometry import (
     above,
     below,
     controlled_body,
@@ -28,12 +26,14 @@ from controller.ground.flight.geometry import (
     stopping_point,
     too_deep,
 )
-from controller.ground.flight.mission_flight import MissionFlight, Then
-from controller.ground.flight.patterns import Orbit, Pattern, Yaw
+from controller.ground.flight.motion.patterns import Orbit, Pattern, Yaw
+from controller.ground.flight.motion.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
+from controller.ground.flight.motion.trajectory import motion_pole
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
-from controller.ground.flight.return_home import ReturnHome, nearest_rally_point
-from controller.ground.flight.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
-from controller.ground.flight.trajectory import motion_pole
+from controller.ground.flight.stages.ascent import Ascent, Step
+from controller.ground.flight.stages.descent import Descent
+from controller.ground.flight.stages.descent import Step as DescentStep
+from controller.ground.flight.stages.return_home import ReturnHome, nearest_rally_point
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import TAKEOFF, WITH_POSITION
 from controller.ground.parameters.protocol import Parameters

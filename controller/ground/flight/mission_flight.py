@@ -10,9 +10,9 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.flight.conditions import CONDITIONS, HeldBack, section_after
+from controller.ground.flight.motion.region_of_interest import RegionOfInterest
 from controller.ground.flight.payload.gripper import GRAB, PATIENCE, RELEASE
 from controller.ground.flight.payload.payload import DELIVER, Payload
-from controller.ground.flight.region_of_interest import RegionOfInterest
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,
     DELAYS,

@@ -47,17 +47,17 @@ from controller.ground.commands.result import (
     not_now,
 )
 from controller.ground.commands.setpoints import Offboard, Setpoint
-from controller.ground.flight.failsafes import Failsafes, Reaction, Situation
-from controller.ground.flight.fence import Fence
-from controller.ground.flight.geometry import above, filled, hanging_load, limited_speed
 from controller.ground.flight.guidance import Guidance, Stage
+from controller.ground.flight.limits.failsafes import Failsafes, Reaction, Situation
+from controller.ground.flight.limits.fence import Fence
+from controller.ground.flight.limits.preconditions import arming_faults, has_settled
 from controller.ground.flight.mission_flight import MissionFlight
-from controller.ground.flight.patterns import Orbit, Pattern
+from controller.ground.flight.motion.geometry import above, filled, hanging_load, limited_speed
+from controller.ground.flight.motion.patterns import Orbit, Pattern
+from controller.ground.flight.motion.setpoint_types import Attitude, Idle, Target, Terminate
+from controller.ground.flight.motion.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.flight.payload.payload import DELIVER, Payload
-from controller.ground.flight.preconditions import arming_faults, has_settled
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
-from controller.ground.flight.setpoint_types import Attitude, Idle, Target, Terminate
-from controller.ground.flight.sticks import JOYSTICK, Axes, Sticks
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import WAYPOINT
 from controller.ground.missions.legs import crossed_zones

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from controller.ground.flight.fence import Fence
-from controller.ground.flight.fence_zones import Zone, crosses
+from controller.ground.flight.limits.fence import Fence
+from controller.ground.flight.limits.fence_zones import Zone, crosses
 from controller.ground.missions.mission_plan import Item, place
 from sitl_bridge.frames import Geodetic, LocalOrigin
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.fence import Fence
+from controller.ground.flight.limits.fence import Fence
 from controller.ground.flight.payload.payload import winch_fault
 from controller.ground.missions.item_types import (
     CHANGE_SPEED,

@@ -6,7 +6,7 @@ import math
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.fence_zones import Place, Zone
+from controller.ground.flight.limits.fence_zones import Place, Zone
 from controller.ground.missions.mission_plan import AMSL_FRAMES, RELATIVE_FRAMES, Fault, Item
 from sitl_bridge.frames import DEG_E7_PER_DEG, Geodetic, LocalOrigin
 

@@ -12,9 +12,9 @@ from controller.ground.commands.setpoints import NOTHING
 from controller.ground.files import metadata
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
-from controller.ground.flight.patterns import FigureEight, Orbit
+from controller.ground.flight.motion.patterns import FigureEight, Orbit
+from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto, Land
 from controller.ground.flight.px4_modes import Mode
-from controller.ground.flight.setpoint_types import Body, Follow, Goto, Land
 from controller.ground.link.heartbeat import heartbeat
 from controller.ground.link.packing import (
     AvailableModes,

@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.setpoint_types import Body, Follow, Goto
+from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto
 from controller.law.state import LOAD_POSITION, LOAD_VELOCITY, Array
 from controller.over.live.reference import LIMITS, LiveReference
 from sitl_bridge.frames import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from controller.ground.flight.setpoint_types import Body, Follow, Goto
-from controller.ground.flight.trajectory import Limits, Trajectory, motion_pole
+from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto
+from controller.ground.flight.motion.trajectory import Limits, Trajectory, motion_pole
 from controller.law.reference import Path
 from controller.law.state import Array
 from controller.over.law import RATE_HZ

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.ground.flight.fence_zones import Zone
+from controller.ground.flight.limits.fence_zones import Zone
 from controller.ground.missions.mission_plan import Item
 from controller.ground.missions.plans import Plans
 from controller.ground.missions.transfer import Client

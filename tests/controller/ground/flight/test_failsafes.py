@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from controller.ground.commands.result import CRITICAL, EMERGENCY, WARNING
-from controller.ground.flight.failsafes import SLOW_CHECKS, Failsafes, Reaction, Situation, Trigger
-from controller.ground.flight.fence import Fence
-from controller.ground.flight.fence_zones import Zone
+from controller.ground.flight.limits.failsafes import SLOW_CHECKS, Failsafes, Reaction, Situation, Trigger
+from controller.ground.flight.limits.fence import Fence
+from controller.ground.flight.limits.fence_zones import Zone
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import VehicleView

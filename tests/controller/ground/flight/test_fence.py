@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from controller.ground.flight.fence import Fence, fence_around
-from controller.ground.flight.fence_zones import Zone, outside
+from controller.ground.flight.limits.fence import Fence, fence_around
+from controller.ground.flight.limits.fence_zones import Zone, outside
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import LocalOrigin

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
-from controller.ground.flight.setpoint_types import Body, Goto, Land
+from controller.ground.flight.motion.setpoint_types import Body, Goto, Land
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Triple, euler_from_quaternion
 

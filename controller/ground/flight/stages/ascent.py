@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from enum import Enum, auto
 
-from controller.ground.flight.setpoint_types import Body, Goto
+from controller.ground.flight.motion.setpoint_types import Body, Goto
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Triple, euler_from_quaternion
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from controller.ground.flight.setpoint_types import Body
-from controller.ground.flight.trajectory import stopping_distance
+from controller.ground.flight.motion.setpoint_types import Body
+from controller.ground.flight.motion.trajectory import stopping_distance
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Triple

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from controller.ground.flight.fence_zones import Zone
-from controller.ground.flight.fence_zones import outside as outside_zones
+from controller.ground.flight.limits.fence_zones import Zone
+from controller.ground.flight.limits.fence_zones import outside as outside_zones
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import Triple

@@ -8,10 +8,10 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from controller.ground.commands.result import CRITICAL, EMERGENCY, WARNING
-from controller.ground.flight.fence import Fence
-from controller.ground.flight.preconditions import tilt
+from controller.ground.flight.limits.fence import Fence
+from controller.ground.flight.limits.preconditions import tilt
+from controller.ground.flight.motion.sticks import JOYSTICK
 from controller.ground.flight.px4_modes import Mode
-from controller.ground.flight.sticks import JOYSTICK
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import VehicleView
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from controller.ground.flight.fence import Fence
+from controller.ground.flight.limits.fence import Fence
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import VehicleView
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from enum import Enum, auto
 
-from controller.ground.flight.fence_zones import Place
-from controller.ground.flight.geometry import above
+from controller.ground.flight.limits.fence_zones import Place
+from controller.ground.flight.motion.geometry import above
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Triple

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import linalg
 
-from controller.ground.flight.setpoint_types import Follow, Goto, Land
+from controller.ground.flight.motion.setpoint_types import Follow, Goto, Land
 from controller.law.reference import DERIVATIVES, Path, local_path
 from controller.law.state import Array
 from sitl_bridge.frames import Triple

@@ -1,0 +1,1 @@
+"""What a flight must not do: geofence, failsafes, preconditions for arming."""

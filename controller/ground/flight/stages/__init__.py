@@ -1,0 +1,1 @@
+"""From the ground into the air and back, step by step."""
