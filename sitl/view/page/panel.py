@@ -15,6 +15,10 @@ PLOTTED = ("tension [N]", "swing [°]", "tilt [°]", "battery [%]")
 NEAREST, DISTANCE_SHARE = 2.5, 0.9
 """m from which a vehicle without a load is looked at, and how much more (m) for each metre of cable."""
 HISTORY_S = 30.0
+BACK_IN_TIME = 0.5
+"""s: a moment so much earlier than the last begins the plots anew."""
+LEAST_STEP = 0.001
+"""s between two points of a plot."""
 SLOW_INTERVAL = 0.2
 """s between two refreshes of numbers and plots."""
 
@@ -60,9 +64,9 @@ class Panel:
     def _plot(self, view: View) -> None:
         """The last half minute of what is known."""
         history = self._history
-        if history and view.time_s < history[-1][0]:
+        if history and view.time_s < history[-1][0] - BACK_IN_TIME:
             history.clear()
-        if history and view.time_s == history[-1][0]:
+        if history and view.time_s < history[-1][0] + LEAST_STEP:
             return
         history.append((view.time_s, *plotted(view)))
         while history[0][0] < view.time_s - HISTORY_S:
@@ -102,7 +106,8 @@ def aim(camera: str, view: View) -> tuple[tuple[float, float, float], tuple[floa
     target = view.load or view.vehicle
     middle = tuple(0.5 * (a + b) for a, b in zip(view.vehicle, target, strict=True))
     if camera == "top":
-        return (x, y - 0.01, z + 1.5 * distance), target
+        height = 1.5 * distance  # a little to the south, so that north is up
+        return (x, y - 0.01 * height, z + height), (x, y, z)
     if camera == "load":
         return (target[0] + 0.3, target[1] - 0.5, target[2] + 0.1), view.vehicle
     return (x - 0.7 * distance, y - 0.7 * distance, z + 0.2 * distance), (middle[0], middle[1], middle[2])

@@ -18,6 +18,8 @@ FENCE_HEIGHT = 3.0
 """m above the ground of the upper of the two lines that stand for a zone's border."""
 POSTS = 16
 """Uprights between the two, at most."""
+MARK = 0.08
+"""m, radius of the ball at an item or a rally point."""
 ABOVE_GROUND = 0.03
 """m, so that ground and line do not flicker."""
 
@@ -67,7 +69,7 @@ class PlanScene:
         self._handles.append(line)
 
     def _mark(self, name: str, text: str, at: Triple, colour: tuple[int, int, int]) -> None:
-        ball = self._scene.add_icosphere(name, radius=0.15, color=colour, position=at, cast_shadow=False)
-        above = (at[0], at[1], at[2] + 0.3)
+        ball = self._scene.add_icosphere(name, radius=MARK, color=colour, position=at, cast_shadow=False)
+        above = (at[0], at[1], at[2] + 2.0 * MARK)
         label = self._scene.add_label(f"{name}_label", text, position=above, anchor="bottom-center")
         self._handles += [ball, label]

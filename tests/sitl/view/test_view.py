@@ -75,6 +75,14 @@ def test_numbers_leave_out_what_is_not_known() -> None:
     assert "50 %" in numbers(View(battery=0.5))
 
 
+def test_from_the_top_north_is_up() -> None:
+    aimed = aim("top", View(vehicle=(1.0, 2.0, 3.0), load=(1.4, 1.9, 1.5)))
+    assert aimed is not None
+    (x, y, z), (to_x, to_y, to_z) = aimed
+    assert (to_x - x, to_z < z) == (0.0, True)
+    assert 0.0 < to_y - y < 0.05 * (z - to_z)
+
+
 @pytest.mark.parametrize("camera", ["chase", "top", "load"])
 def test_a_camera_looks_at_what_flies_from_elsewhere(camera: str) -> None:
     view = View(vehicle=(1.0, 2.0, 3.0), load=(1.0, 2.0, 1.5))
