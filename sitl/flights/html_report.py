@@ -17,11 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from sitl.recording.recording import Array, Recording
+from sitl.recording.recording import Array, Columns, Recording
 
 FILE_NAME = "flight.html"
 MOST_POINTS = 1500
 """Of a line; between them the smallest and largest value of each stretch are kept."""
+LOAD = 3
+"""Row of the load's position in the covariance of the estimate."""
 _COLOURS = {"x": "#d62728", "y": "#2ca02c", "z": "#1f77b4"}
 _PANELS = (
     "load and set-point [m]",
@@ -63,6 +65,14 @@ def tilt_deg(recording: Recording) -> Array:
     return np.degrees(np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)))
 
 
+def two_sigma(covariance: Columns, axis: int, most: int = MOST_POINTS) -> tuple[Array, Array]:
+    """Times (n,) and two standard deviations (n,) of the load's position along an axis of the world, m."""
+    row = LOAD + axis
+    every = max(1, len(covariance["time_s"]) // most)
+    variance = covariance[f"covariance_{row}_{row}"][::every]
+    return covariance["time_s"][::every], 2.0 * np.sqrt(np.maximum(variance, 0.0))
+
+
 def slack_spans(times: Array, tension: Array) -> list[tuple[float, float]]:
     """Stretches of time in which the cable carries nothing."""
     slack = np.concatenate(([0], (tension <= 0.0).astype(int), [0]))
@@ -100,23 +110,24 @@ def _figure(recording: Recording) -> dict[str, Any]:
 
 
 def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, colour: str) -> None:
-    """The estimate of one coordinate of the load, where there is one."""
+    """The estimate of one coordinate of the load, with its band of two standard deviations."""
     estimates = recording.estimates
     if estimates is None:
         return
+    common = {"type": "scatter", "mode": "lines", "yaxis": "y", "legendgroup": "1"}
     x, y = envelope(estimates["time_s"], estimates[f"load_{letter}_m"])
+    dotted = {"color": colour, "width": 1, "dash": "dot"}
     traces.append(
-        {
-            "x": x.tolist(),
-            "y": y.tolist(),
-            "name": f"{letter}, estimated",
-            "type": "scatter",
-            "mode": "lines",
-            "line": {"color": colour, "width": 1, "dash": "dot"},
-            "yaxis": "y",
-            "legendgroup": "1",
-        }
+        {**common, "x": x.tolist(), "y": y.tolist(), "name": f"{letter}, estimated", "line": dotted}
     )
+    if recording.covariance is None:
+        return
+    times, deviations = two_sigma(recording.covariance, "xyz".index(letter))
+    middle = np.interp(times, estimates["time_s"], estimates[f"load_{letter}_m"])
+    edge = {**common, "x": times.tolist(), "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
+    traces.append({**edge, "y": (middle - deviations).tolist(), "name": f"{letter}, lower edge"})
+    band = {"fill": "tonexty", "fillcolor": colour + "22", "showlegend": True, "name": f"{letter}, ±2 σ"}
+    traces.append({**edge, "y": (middle + deviations).tolist(), **band})
 
 
 def _layout(recording: Recording) -> dict[str, Any]:
@@ -127,9 +138,13 @@ def _layout(recording: Recording) -> dict[str, Any]:
         "height": 1150,
         "margin": {"l": 70, "r": 20, "t": 20, "b": 50},
         "hovermode": "x unified",
+        "legend": {"traceorder": "grouped"},
         "template": "plotly_white",
         "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(_PANELS)}"},
-        "shapes": _shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
+        "shapes": [
+            *_shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
+            _limit(len(_PANELS)),
+        ],
     }
     for index, title in enumerate(_PANELS):
         top = 1.0 - index * (height + gap)
@@ -155,6 +170,30 @@ def _shading(spans: Iterable[tuple[float, float]]) -> list[dict[str, Any]]:
     ]
 
 
+def _limit(panel: int) -> dict[str, Any]:
+    """A dashed line at the largest speed of the rotors."""
+    line = {"color": "#555", "width": 1, "dash": "dash"}
+    across = {"type": "line", "xref": "paper", "x0": 0, "x1": 1}
+    return {**across, "yref": f"y{panel}", "y0": 1.0, "y1": 1.0, "line": line}
+
+
+def said(summary: dict[str, Any]) -> str:
+    """How the flight ended and how the link did, in a sentence each."""
+    outcome = ", ".join(str(summary[key]) for key in ("outcome", "outcome_cause") if summary.get(key))
+    ticks = [
+        f"{summary[key]} ticks {what}"
+        for key, what in (
+            ("late_ticks", "late"),
+            ("resent_ticks", "sent again"),
+            ("unanswered_ticks", "without an answer"),
+        )
+        if summary.get(key)
+    ]
+    link = ", ".join(ticks) or "no tick late, sent again, or without an answer"
+    clock = f"{summary.get('clock')} at {summary.get('rate_hz'):g} Hz" if summary.get("rate_hz") else ""
+    return f"{outcome or 'no outcome'}. Link: {clock}{': ' if clock else ''}{link}."
+
+
 def _facts(summary: dict[str, Any]) -> str:
     """The summary as a table: plain values only."""
     rows = []
@@ -171,7 +210,10 @@ def _page(summary: dict[str, Any], figure: dict[str, Any]) -> str:
     title = html.escape(f"{summary.get('scenario')}: {summary.get('vehicle')}")
     data = json.dumps(figure, allow_nan=False)
     facts = _facts(summary)
-    return _TEMPLATE.format(title=title, facts=facts, script=_packed(script), data=_packed(data.encode()))
+    outcome = html.escape(said(summary))
+    return _TEMPLATE.format(
+        title=title, said=outcome, facts=facts, script=_packed(script), data=_packed(data.encode())
+    )
 
 
 def _packed(content: bytes) -> str:
@@ -192,7 +234,8 @@ th {{ text-align: left; font-weight: 500; padding-right: 1.5em; }}
 </head>
 <body>
 <h1>{title}</h1>
-<p>Grey stretches: the cable is slack.
+<p>{said}</p>
+<p>Grey stretches: the cable is slack. Dashed in the last panel: the rotors' largest speed.
 Click a name to hide its line, drag to zoom, double-click to go back.</p>
 <div id="figure"></div>
 <details><summary>All figures of the flight</summary><table>

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.feedback.log import ESTIMATE_NAME
+from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.state_log import FILE_NAME as STATES_NAME
 from sitl_bridge.vehicle.description import Vehicle
@@ -43,6 +43,8 @@ class Recording:
     """(n, 3), m: where the load was to be at each row, as it was set."""
     estimates: Columns | None
     """Columns of the estimate's log on its own rows; None: there is none."""
+    covariance: Columns | None = None
+    """Likewise of its covariance."""
 
     @property
     def times(self) -> Array:
@@ -112,7 +114,7 @@ def read_recording(folder: Path) -> Recording:
     set_points = [
         np.interp(states["time_s"], reference["time_s"], reference[name]) for name in REFERENCE_COLUMNS[1:]
     ]
-    estimates = folder / ESTIMATE_NAME
+    estimates, covariance = folder / ESTIMATE_NAME, folder / COVARIANCE_NAME
     return Recording(
         folder,
         _summary(folder),
@@ -120,6 +122,7 @@ def read_recording(folder: Path) -> Recording:
         states,
         np.stack(set_points, axis=1),
         read_columns(estimates) if estimates.exists() else None,
+        read_columns(covariance) if covariance.exists() else None,
     )
 
 

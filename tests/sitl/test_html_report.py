@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.flights.html_report import envelope, slack_spans, swing_deg, tilt_deg, write_html
+from sitl.flights.html_report import envelope, said, slack_spans, swing_deg, tilt_deg, two_sigma, write_html
 from sitl.recording.recording import read_recording
 from tests.sitl.export.flights import leave_flight
 
@@ -56,3 +56,25 @@ def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -
     }
     assert max(traces["x of the load"]["y"]) == pytest.approx(recording.states["load_x_m"].max(), rel=1e-5)
     assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
+
+
+def test_the_band_is_two_standard_deviations_of_the_loads_position() -> None:
+    covariance = {"time_s": np.array([0.0, 0.2])}
+    covariance |= {f"covariance_{n}_{n}": np.full(2, 0.01 * (n + 1)) for n in range(18)}
+    times, deviations = two_sigma(covariance, 2)
+    assert times.tolist() == [0.0, 0.2]
+    assert deviations == pytest.approx(2.0 * np.sqrt([0.06, 0.06]))
+
+
+def test_how_it_ended_is_said_in_words() -> None:
+    summary = {
+        "outcome": "did not settle",
+        "outcome_cause": "0.4 m off",
+        "clock": "lockstep",
+        "rate_hz": 250.0,
+    }
+    assert said(summary) == (
+        "did not settle, 0.4 m off. Link: lockstep at 250 Hz: no tick late, sent again, or without an answer."
+    )
+    assert "3 ticks sent again" in said({**summary, "resent_ticks": 3, "late_ticks": 0})
+    assert said({}).startswith("no outcome")

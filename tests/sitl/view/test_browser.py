@@ -34,8 +34,8 @@ def page() -> Iterator[Page]:
             executable_path=BROWSER,
             args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"],
         )
-        size = {"width": 900, "height": 600} if PICTURES else {"width": 700, "height": 450}  # smaller is faster
-        page = browser.new_page(viewport=size)
+        width, height = (900, 600) if PICTURES else (700, 450)  # a smaller one is drawn faster
+        page = browser.new_page(viewport={"width": width, "height": height})
         page.set_default_timeout(1e3 * PATIENCE)
         yield page
         browser.close()
