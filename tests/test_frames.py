@@ -150,9 +150,43 @@ def test_wire_units() -> None:
     assert 1.5 * frames.MILLIMETRES_PER_METRE == 1500
     assert 1.5 * frames.CENTIMETRES_PER_METRE == 150
     assert math.pi * frames.CENTIDEGREES_PER_RADIAN == pytest.approx(18000)
+    assert 0.25 * frames.MILLISECONDS_PER_SECOND == 250
     assert 0.004 * frames.MICROSECONDS_PER_SECOND == 4000
     assert pytest.approx(1013.25) == 101325 * frames.HECTOPASCALS_PER_PASCAL
     assert pytest.approx(0.5) == 50e-6 * frames.GAUSS_PER_TESLA
+    assert 16.25 * frames.MILLIVOLTS_PER_VOLT == 16250
+    assert 1.25 * frames.CENTIAMPERES_PER_AMPERE == 125
+    assert 2.5 * frames.MILLIAMPERE_HOURS_PER_AMPERE_HOUR == 2500
+    assert 0.25 * frames.PERCENT == 25
+    assert frames.STANDARD_GRAVITY == 9.80665
+    assert 2 * 9.80665 * frames.MILLI_G_PER_METRE_PER_SECOND_SQUARED == pytest.approx(2000)
+
+
+def test_a_degree_at_the_equator_and_a_degree_of_the_meridian() -> None:
+    """WGS 84 at sea level: 111319.491 m of longitude; 110574.276 m of latitude at 0°, 111131.777 m at 45°."""
+    equator, middle = LocalOrigin(0.0, 0.0, 0.0), LocalOrigin(45.0, 0.0, 0.0)
+    east, north = (1.0 / per_metre for per_metre in equator.degrees_per_metre)
+    assert east == pytest.approx(math.radians(6378137.0), abs=1e-3)
+    assert north == pytest.approx(math.radians(6335439.327), abs=1e-3)
+    assert 1.0 / middle.degrees_per_metre[1] == pytest.approx(math.radians(6367381.816), abs=1e-2)
+    assert 1.0 / LocalOrigin(0.0, 0.0, 1000.0).degrees_per_metre[0] == pytest.approx(math.radians(6379137.0))
+
+
+def test_a_fix_from_the_wire() -> None:
+    origin = LocalOrigin(47.0, 8.0, 488.0)
+    gps = {"lat": 470001000, "lon": 80002000, "alt": 490500, "vn": 120, "ve": -50, "vd": 25}
+    position, velocity = frames.fix_from_wire(gps, origin)
+    assert velocity == (-0.5, 1.2, -0.25)
+    assert position == pytest.approx(origin.local(Geodetic(47.0001, 8.0002, 490.5)))
+    assert position[2] == 2.5
+
+
+def test_rotations_about_each_axis() -> None:
+    half = math.sqrt(0.5)
+    assert frames.rotate((half, half, 0, 0), (1, 2, 3)) == pytest.approx((1, -3, 2))
+    assert frames.rotate((half, 0, half, 0), (1, 2, 3)) == pytest.approx((3, 2, -1))
+    assert frames.rotate((half, 0, 0, half), (1, 2, 3)) == pytest.approx((-2, 1, 3))
+    assert frames.rotate_inverse((half, 0, 0, half), (1, 2, 3)) == pytest.approx((2, -1, 3))
 
 
 def ecef(point: Geodetic) -> Array:
