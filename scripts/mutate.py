@@ -38,6 +38,7 @@ from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.operator import Operator
 from cosmic_ray.plugins import get_operator, operator_names
+from hypothesis import Phase, settings
 from parso.python.tree import Keyword
 
 OPERATORS = re.compile(
@@ -214,6 +215,9 @@ class Tests:
         sys.dont_write_bytecode = not warm
         if not warm:
             os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+        # A failure is all there is to know of: its example need not be made smaller.
+        settings.register_profile("no shrinking", phases=(Phase.explicit, Phase.generate))
+        settings.load_profile("no shrinking")
         status = 1
         try:
             status = int(pytest.main(["-x", "-p", "no:cacheprovider", "-p", "no:xdist", *self._paths]))
