@@ -16,7 +16,9 @@ from controller.law.control_law import WORK
 from controller.law.state import STATE_SIZE, Array
 from tests.controller.fleet import FLEET, attributes, delayed
 
-VEHICLE = FLEET["small"]
+SMALL = FLEET["small"]
+UNEQUAL = SMALL.airframe.model_copy(update={"inertia": (0.03, 0.04, 0.055)})
+VEHICLE = SMALL.model_copy(update={"airframe": UNEQUAL})
 RATE_HZ = 100.0
 INERTIA = np.array(VEHICLE.airframe.inertia)
 RATES = np.array([0.3, -0.4, 0.5])
@@ -108,6 +110,17 @@ def test_rates_that_an_attitude_asks_for_are_limited() -> None:
         asked = sign * np.array([2.0, 3.0, 1.0])
         expected = of_rate_error(law, asked - RATES)
         np.testing.assert_allclose(law.step(euler=(0.0, 0.0, 0.0))[1:], expected)
+
+
+def test_level_and_at_rest_no_moment_is_asked_for() -> None:
+    law = Law()
+    law.law.has_attitude = 1
+    assert law.step(euler=(0.0, 0.0, 0.0), rates=np.zeros(3)).tolist() == [
+        VEHICLE.hover_thrust,
+        0.0,
+        0.0,
+        0.0,
+    ]
 
 
 def test_upside_down_it_rolls_back() -> None:

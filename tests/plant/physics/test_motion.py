@@ -13,7 +13,7 @@ from sitl_bridge.plant.physics import dynamics
 from sitl_bridge.plant.physics.cable import stretch, taut_force, tension_of
 from sitl_bridge.plant.physics.flexible_cable import flexible_cable
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle
-from sitl_bridge.plant.physics.parameters import parameters
+from sitl_bridge.plant.physics.parameters import PARAMETERS, parameters
 from sitl_bridge.plant.physics.rotors import rotor_wrench
 from sitl_bridge.plant.physics.state import (
     ANCHOR_EAST,
@@ -410,6 +410,20 @@ def test_gripper_and_winch_work_in_each_step() -> None:
     assert p.rest_length == pytest.approx(1.0 + 1e-3 * sum(lag))
     dynamics.advance.python([p], x, inner, speeds, *tables, work, 0, 0, 99, 99, 1, 1e-3)
     assert inner[CABLE_HOLDS] == 0.0
+
+
+def test_what_is_declared_to_the_compiler_fits_what_is_flown() -> None:
+    record, rotors, table = np.zeros(1, dtype=PARAMETERS), np.zeros(MOST_ROTORS), np.zeros((1024, 6))
+    state, inner, work = np.zeros(STATE_SIZE), np.zeros(INNER_SIZE), np.zeros(dynamics.WORK_SHAPE)
+    advanced = (record, state, inner, rotors, table, table, work)
+    for entry, arrays in (
+        (dynamics.advance, advanced),
+        (dynamics.set_rotors, (record, rotors, rotors, rotors)),
+    ):
+        for declared, array in zip(entry.arguments, arrays, strict=False):
+            assert (np.dtype(declared.dtype), declared.shape) == (array.dtype, array.shape)
+        assert entry.buffers == len(arrays)
+    assert dynamics.WORK_SHAPE[0] > 11  # rows that are named at the top
 
 
 # What is measured
