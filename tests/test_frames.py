@@ -159,7 +159,7 @@ def test_wire_units() -> None:
     assert 2.5 * frames.MILLIAMPERE_HOURS_PER_AMPERE_HOUR == 2500
     assert 0.25 * frames.PERCENT == 25
     assert frames.STANDARD_GRAVITY == 9.80665
-    assert 2 * 9.80665 * frames.MILLI_G_PER_METRE_PER_SECOND_SQUARED == pytest.approx(2000)
+    assert pytest.approx(2000) == 2 * 9.80665 * frames.MILLI_G_PER_METRE_PER_SECOND_SQUARED
 
 
 def test_a_degree_at_the_equator_and_a_degree_of_the_meridian() -> None:

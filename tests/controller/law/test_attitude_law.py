@@ -69,6 +69,14 @@ def test_the_gains_of_a_vehicle() -> None:
     np.testing.assert_allclose(record["largest_rate"][0], (1.0, 2.0, 3.0))
 
 
+def test_what_is_declared_to_the_compiler_fits_a_law() -> None:
+    records = (attitude_law.attitude_law(VEHICLE, RATE_HZ), allocation(VEHICLE), np.zeros(1, WORK))
+    arrays = (*records, np.zeros(STATE_SIZE), np.zeros(16))
+    assert attitude_step.buffers == len(attitude_step.arguments) == len(arrays)
+    for declared, array in zip(attitude_step.arguments, arrays, strict=True):
+        assert (np.dtype(declared.dtype), declared.shape) == (array.dtype, array.shape)
+
+
 def test_rates_alone() -> None:
     law = Law()
     law.law.rate[:] = 0.5, math.nan, -0.1

@@ -139,10 +139,20 @@ def test_the_yaws_deviation_is_the_short_way_round(yaw: float, expected: float |
     assert law.work.deviation[17] == pytest.approx(short)
 
 
+def one_piece() -> Path:
+    """A step along one polynomial of degree 7, whose first three derivatives vanish at both ends."""
+    path = setpoint(TARGET, ORIGIN)
+    path["pieces"] = 1
+    path["profile"][0, 0] = 0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0
+    return path
+
+
 FEASIBLE: dict[str, Path] = {
     "smooth step": setpoint(TARGET, ORIGIN),
     "planned step": planned(setpoint(TARGET, ORIGIN), VEHICLE),
-    "circle": planned(circle(ORIGIN, 5.0, 1.5, ORIGIN), VEHICLE),
+    "step of one piece": one_piece(),
+    "circle": circle(ORIGIN, 5.0, 1.5, ORIGIN),
+    "planned circle": planned(circle(ORIGIN, 5.0, 1.5, ORIGIN), VEHICLE),
 }
 
 
@@ -259,6 +269,15 @@ def test_a_law_that_takes_over_remembers_where_the_load_was() -> None:
 
 
 # The whole control step
+
+
+def test_what_is_declared_to_the_compiler_fits_a_law() -> None:
+    law = (np.zeros(1, DESIGN), allocation(VEHICLE), setpoint(TARGET, ORIGIN), engaged_memory(ANCHOR))
+    arrays = (*law, np.zeros(1, WORK), np.zeros(STATE_SIZE), np.zeros(16))
+    entry = control_step.control_step
+    assert entry.buffers == len(entry.arguments) == len(arrays)
+    for declared, array in zip(entry.arguments, arrays, strict=True):
+        assert (np.dtype(declared.dtype), declared.shape) == (array.dtype, array.shape)
 
 
 def stepped(law: Law, estimate: Array) -> tuple[int, Array]:
