@@ -17,6 +17,14 @@ def test_percentiles_as_of_a_list() -> None:
         assert lateness.percentile(percent) == pytest.approx(np.percentile(late, percent), rel=0.01)
 
 
+def test_a_percentile_is_right_to_a_quarter_of_a_percent() -> None:
+    for late in np.geomspace(2e-7, 900.0, 50).tolist():
+        lateness = Lateness()
+        lateness.add(late)
+        lateness.add(1e3)
+        assert lateness.percentile(50) == pytest.approx(late, rel=0.0026)
+
+
 def test_no_ticks_punctual_ones_and_hours() -> None:
     lateness = Lateness()
     assert lateness.percentile(50) is None
