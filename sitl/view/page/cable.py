@@ -45,7 +45,7 @@ class CableScene:
             return
         points = np.array([view.vehicle, *view.nodes, view.load])
         shares = load_shares(self._vehicle, view.tension, points)
-        self._have(len(shares))
+        self._have(len(shares), view.cable_length or 1.0, colour_of(shares[0]))
         for rod, top, bottom, share in zip(self._rods, points[:-1], points[1:], shares, strict=True):
             length = float(np.linalg.norm(bottom - top))
             if length == 0.0:
@@ -57,8 +57,8 @@ class CableScene:
             if rod.color != colour:
                 rod.color = colour
 
-    def _have(self, count: int) -> None:
-        """So many rods."""
+    def _have(self, count: int, length: float, colour: Colour) -> None:
+        """So many rods, new ones of this colour and length over all (m): changes come late to the browser."""
         while len(self._rods) > count:
             self._rods.pop().remove()
         while len(self._rods) < count:
@@ -66,9 +66,9 @@ class CableScene:
                 f"/cable/{len(self._rods)}",
                 radius=self._radius,
                 height=1.0,
-                color=_SLACK,
+                color=colour,
                 radial_segments=8,
-                scale=(1.0, 1.0, 1.0),
+                scale=(1.0, 1.0, length / count),
                 cast_shadow=False,
             )
             self._rods.append(rod)

@@ -7,9 +7,11 @@ from collections import deque
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl.view.view import View
 
+Array = NDArray[np.float64]
 CAMERAS = ("free", "chase", "top", "load")
 PLOTTED = ("tension [N]", "swing [°]", "tilt [°]", "battery [%]")
 NEAREST, DISTANCE_SHARE = 2.5, 0.9
@@ -27,27 +29,14 @@ class Panel:
     """What stands beside the scene."""
 
     def __init__(self, server: Any) -> None:
-        from viser import uplot
-
         self._server = server
         gui = server.gui
         self.camera = gui.add_dropdown("Camera", CAMERAS, initial_value="chase")
         self._numbers = gui.add_markdown("waiting for a vehicle …")
         self._texts = gui.add_markdown("", visible=False)
         self._history: deque[tuple[float, ...]] = deque()
-        empty = np.zeros(2)
-        self._plots = [
-            gui.add_uplot(
-                (np.arange(2.0), empty),
-                (uplot.Series(label="t"), uplot.Series(label=label, stroke="#2f6fd0", width=2)),
-                title=label,
-                scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
-                legend=uplot.Legend(show=False),
-                aspect=3.0,
-                visible=False,
-            )
-            for label in PLOTTED
-        ]
+        self._plots: dict[str, Any] = {}
+        """Added when there is something to plot: one that is shown later than it was made has no width."""
         self._next = -math.inf
 
     def show(self, view: View, now: float) -> None:
@@ -72,11 +61,26 @@ class Panel:
         while history[0][0] < view.time_s - HISTORY_S:
             history.popleft()
         times, *columns = np.array(history).T
-        for plot, column in zip(self._plots, columns, strict=True):
+        for label, column in zip(PLOTTED, columns, strict=True):
             known = np.isfinite(column)
-            plot.visible = bool(known.sum() > 1)
-            if plot.visible:
-                plot.data = (times[known], column[known])
+            if known.sum() > 1:
+                self._draw(label, times[known], column[known])
+
+    def _draw(self, label: str, times: Array, values: Array) -> None:
+        """A line through (times, values), both (n,), in the plot of that name."""
+        from viser import uplot
+
+        if label in self._plots:
+            self._plots[label].data = (times, values)
+            return
+        self._plots[label] = self._server.gui.add_uplot(
+            (times, values),
+            (uplot.Series(label="t"), uplot.Series(label=label, stroke="#2f6fd0", width=2)),
+            title=label,
+            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
+            legend=uplot.Legend(show=False),
+            aspect=3.0,
+        )
 
     def _aim(self, view: View) -> None:
         aimed = aim(self.camera.value, view)
