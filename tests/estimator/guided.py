@@ -48,10 +48,14 @@ class GuidedFlight:
         seed: int = 0,
         faults: dict[str, Any] | None = None,
         redesigner: Redesigner | None = None,
+        told: Vehicle | None = None,
+        after_tick: Callable[[], None] = lambda: None,
         **parameters: float,
     ) -> None:
-        """redesigner: by default, gains stay as they are."""
-        self.vehicle = vehicle
+        """redesigner: by default, gains stay as they are. told: the autopilot's description, by default the
+        plant's."""
+        self.vehicle = vehicle if told is None else told
+        self._after_tick = after_tick
         self._redesigner = redesigner or NoRedesign()
         table = validated(Faults, faults or {}, "faults")
         self.simulation = Simulation(vehicle, RATE_HZ, seed, faults=table)
@@ -110,6 +114,7 @@ class GuidedFlight:
         state = self.simulation.world.state
         estimate = np.array(self.feedback.estimator.state())
         self.rows.append((self.now, state.copy(), estimate))
+        self._after_tick()
 
     def arm_and_take_off(self, height: float) -> None:
         """Wait until it can be armed, arm, take off, wait for Hold."""

@@ -38,10 +38,10 @@ class StandIn:
         self._parameters = folder / "parameters.json"
         self._parameters.write_text(json.dumps(PATIENT))
 
-    def start_plant(self, *arguments: str) -> Process:
+    def start_plant(self) -> Process:
         """The plant, as `fly` would launch it."""
         hil = ("--hil", f"tcpin:127.0.0.1:{self.hil}", "--truth-to", f"127.0.0.1:{self.truth}")
-        return self._start("plant", *IRIS, *hil, *arguments)
+        return self._start("plant", *IRIS, *hil)
 
     def start_stack(self) -> Process:
         """Our autopilot under ground control."""
@@ -54,14 +54,10 @@ class StandIn:
         """The address of the stack."""
         return f"udpin:127.0.0.1:{self.onboard_peer}"
 
-    def start_companion(self, *arguments: str, over: str | None = None, scenario: str = "hover") -> Process:
-        """A companion that holds the load on truth.
-
-        A stack turns on with the last body rates until it notices that there are no more: in hover with none.
-        """
+    def start_companion(self, over: str) -> Process:
+        """A companion that holds the load on truth; over: the stack's address."""
         truth = ("--load", "truth", "--truth-from", f"udpin:127.0.0.1:{self.truth}")
-        reference = ("--scenario", scenario, *IRIS)
-        return self._start("controller", *reference, "--over", over or self.over, *truth, *arguments)
+        return self._start("controller", "--scenario", "hover", *IRIS, "--over", over, *truth)
 
 
 class SerialLine:
