@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-LONGEST_STANDSTILL = 2.0
+LONGEST_STANDSTILL = 10.0
 """s by the wall clock; a world that has stood still for longer is taken for dead."""
 
 

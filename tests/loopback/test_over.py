@@ -31,7 +31,7 @@ def test_fly_over_a_stack_that_somebody_else_starts(start: Start, tmp_path: Path
     flight.wait_for("waiting for a flight stack")
     stand_in.start_stack()
     code, output, errors = flight.finish()
-    assert code == 0, errors
+    assert code == 0, output + errors
     summary = json.loads(output)
     assert summary == json.loads((out / "summary.json").read_text())
     assert summary.keys() >= KEYS

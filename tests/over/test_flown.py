@@ -13,13 +13,14 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.law.reference import Path as Reference
 from controller.law.reference import setpoint
+from controller.over.ages import LONGEST_STANDSTILL
 from controller.over.run import Live, LivePorts, OverOptions
 from controller.over.stack import read_stack
 from controller.over.states import State
 from sitl.command_line.commands import main
 from sitl.over.window import step_figures
 from sitl_bridge.mavlink.framing import Packer, decode, split
-from sitl_bridge.mavlink.links import Address
+from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.process import Speaker
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.over.flown import FlownOver
@@ -66,8 +67,10 @@ def test_a_silent_companion_is_replaced_and_an_operator_is_obeyed() -> None:
     over.run_until(lambda: third.state is State.FLYING, 30.0, "the third flies")
     companion, now = over.companion, over.stack.now  # the stack stands still, and the world with it
     assert companion is not None
-    for k in range(1, 300):
+    for k in range(round(LONGEST_STANDSTILL / 0.01)):
         companion.to_send(now + 0.01 * k)
+        assert third.state is State.FLYING  # a busy machine
+    companion.to_send(now + LONGEST_STANDSTILL + 0.02)
     assert third.state is State.FAILED
     assert "state is older than 0.2 s: nothing is sent any more" in over.said[-1]
 

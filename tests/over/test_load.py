@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.law.state import LOAD_POSITION
+from controller.over.ages import LONGEST_STANDSTILL
 from controller.over.load.filtered import FilteredSource, Sensor, load_source
+from controller.over.load.source import TruthSource
 from controller.over.telemetry import ImuSample, Telemetry, VehicleState
 from sitl_bridge.frames import LocalOrigin, flu_to_frd, rotate_inverse
 from sitl_bridge.mavlink.framing import Packer, split
@@ -101,3 +104,25 @@ def test_no_datagram_upsets_a_source(data: bytes, kind: str) -> None:
     for frame in split(data).frames:
         source.hear(frame, 0.0)
     assert source.state(Telemetry(), 0.0) is None
+
+
+def test_the_truth_ages_by_the_stacks_time() -> None:
+    """A plant that stands still for a while has nothing new to say; one whose link is gone flies on."""
+    source, telemetry = TruthSource(), Telemetry()
+    world = World(SWINGING, 250.0, seed=0)
+    zero, unknown = (0.0,) * 3, [math.nan] + [0.0] * 20
+    at_rest = mavlink.MAVLink_odometry_message(0, 1, 12, *zero, [1, 0, 0, 0], *zero, *zero, unknown, unknown)
+    for packer in (Packer(1, 191), LOAD):
+        for frame in split(packer.pack(at_rest)).frames:
+            source.hear(frame, 5.0)
+    place = tuple(world.state[0:3].tolist())
+
+    def missing(stack_time: float, now: float) -> str | None:
+        telemetry.vehicle = VehicleState(stack_time, place, zero, (1.0, 0.0, 0.0, 0.0), zero)
+        assert (source.state(telemetry, now) is None) == (source.missing(telemetry, now) is not None)
+        return source.missing(telemetry, now)
+
+    assert missing(30.0, 5.0) is None
+    assert missing(30.1, 5.0 + 0.9 * LONGEST_STANDSTILL) is None
+    assert missing(30.3, 5.1) is not None
+    assert missing(30.1, 5.1 + LONGEST_STANDSTILL) is not None

@@ -21,6 +21,7 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
+from controller.over.ages import LONGEST_STANDSTILL
 from controller.over.telemetry import Telemetry, VehicleState
 from sitl_bridge.frames import (
     attitude_to_enu_flu,
@@ -33,7 +34,7 @@ from sitl_bridge.ids import COMPONENT_LOAD
 from sitl_bridge.mavlink.framing import Frame, decode
 
 MOST_TRUTH_AGE = 0.2
-"""s"""
+"""s, by which the stack's time may go on without a new truth."""
 
 
 class LoadSource(Protocol):
@@ -73,6 +74,8 @@ class TruthSource:
         self._vehicle: VehicleState | None = None
         self._load: tuple[tuple[float, ...], tuple[float, ...]] | None = None
         self._at = -math.inf
+        self._stack_time: float | None = None
+        """s, of the stack's newest state when the truth was used first; None: it was not yet."""
 
     def hear(self, frame: Frame, now: float) -> None:
         """ODOMETRY of the load, and of the vehicle by the plant's own component."""
@@ -87,7 +90,7 @@ class TruthSource:
             velocity = rotate(attitude, flu_to_frd((message.vx, message.vy, message.vz)))
             rates = flu_to_frd((message.rollspeed, message.pitchspeed, message.yawspeed))
             self._vehicle = VehicleState(message.time_usec * 1e-6, place, velocity, attitude, rates)
-            self._at = now
+            self._at, self._stack_time = now, None
 
     @property
     def time_s(self) -> float | None:
@@ -98,13 +101,20 @@ class TruthSource:
         """ODOMETRY of both bodies."""
         if self._vehicle is None or self._load is None:
             return "the plant's ODOMETRY of vehicle and load (`sitl plant --truth-to`)"
-        if now - self._at > MOST_TRUTH_AGE:
+        if self._old(telemetry, now):
             return "new ODOMETRY from the plant"
         return None
 
+    def _old(self, telemetry: Telemetry, now: float) -> bool:
+        """By the stack's time: where a plant gets no turn, on a busy machine, its stack stands still too."""
+        stack_time = 0.0 if telemetry.vehicle is None else telemetry.vehicle.time_s
+        if self._stack_time is None:
+            self._stack_time = stack_time
+        return stack_time - self._stack_time > MOST_TRUTH_AGE or now - self._at > LONGEST_STANDSTILL
+
     def state(self, telemetry: Telemetry, now: float) -> Array | None:
         """Vehicle and load as the plant has them."""
-        if self._vehicle is None or self._load is None or now - self._at > MOST_TRUTH_AGE:
+        if self._vehicle is None or self._load is None or self._old(telemetry, now):
             return None
         out = law_state(self._vehicle)
         out[LOAD_POSITION], out[LOAD_VELOCITY] = self._load
