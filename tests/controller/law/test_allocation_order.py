@@ -75,7 +75,7 @@ def test_what_gives_way_and_how_far(name: str) -> None:
 
 
 def test_the_record_of_a_vehicle() -> None:
-    record = allocation(UNEQUAL)[0]
+    (record,) = allocation(UNEQUAL)
     assert record["rotor_count"] == 5
     assert record["largest_thrust"][:5] == pytest.approx([10.0 * s for s in (1.0, 1.3, 0.8, 1.1, 0.9)])
     assert record["thrust_coefficient"][:5] == pytest.approx([1e-5 * s for s in (1.0, 1.3, 0.8, 1.1, 0.9)])

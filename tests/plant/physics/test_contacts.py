@@ -142,7 +142,10 @@ def test_one_leg_that_slips_or_rises_fast_is_loose() -> None:
     x, inner = in_the_ground(depth=0.15)
     x[VEHICLE_VELOCITY], x[BODY_RATES] = (0.005, -0.004, -0.003), (0.01, -0.02, 0.03)
     inner[ANCHOR_NORTH + 3] += 1.0
-    assert ground.ground_on_standing(P, x, inner, np.zeros(7)) == 1
+    out = np.zeros(7)
+    assert ground.ground_on_standing(P, x, inner, out) == 1
+    ground.ground_on_vehicle(P, x, inner, out)
+    np.testing.assert_allclose(out, [*expected_wrench(x, inner)[0], 1.0], rtol=1e-9)
     x, inner = in_the_ground(depth=0.15)
     x[5] = 1e3  # every normal force would be a pull
     assert ground.ground_on_standing(P, x, inner, np.zeros(7)) == 5
