@@ -1,8 +1,9 @@
-"""The map of the code leads to places that exist."""
+"""The map of the code, and the table of mutation testing, lead to places that exist."""
 
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,14 @@ def test_every_name_is_defined_in_a_file_of_the_map() -> None:
         for part in name.split("."):
             defined = rf"(def|class) {part}\b|^{part} = |self\.{part} = "
             assert re.search(defined, sources, re.MULTILINE), name
+
+
+def test_every_file_of_the_mutation_table_exists_and_has_the_line_of_each_known_survivor() -> None:
+    table = tomllib.loads((TOP / "tests/mutation.toml").read_text(encoding="utf-8"))["module"]
+    for name, module in table.items():
+        for path in (*module["files"], *module["tests"]):
+            assert (TOP / path).exists(), path
+        lines = {line.strip() for path in module["files"] for line in (TOP / path).read_text().splitlines()}
+        for survivor in module.get("survivor", ()):
+            assert survivor["before"] in lines, (name, survivor["before"])
+            assert survivor["reason"], (name, survivor["before"])

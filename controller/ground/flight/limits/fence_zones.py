@@ -53,6 +53,9 @@ def _distance(point: Place, start: Place, end: Place) -> float:
 
 def _meet(a: Place, b: Place, c: Place, d: Place) -> bool:
     """Whether the straight ways from a to b and from c to d have a point in common."""
+    for i in range(2):  # ways in one line have it only if they overlap
+        if max(min(a[i], b[i]), min(c[i], d[i])) > min(max(a[i], b[i]), max(c[i], d[i])):
+            return False
     return _side(a, b, c) * _side(a, b, d) <= 0.0 and _side(c, d, a) * _side(c, d, b) <= 0.0
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from controller.ground.flight.limits.fence import Fence, fence_around
-from controller.ground.flight.limits.fence_zones import Zone, outside
+from controller.ground.flight.limits.fence_zones import Zone, crosses, outside
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile
 from sitl_bridge.frames import LocalOrigin
@@ -139,3 +140,61 @@ def test_zones_together() -> None:
     assert outside(zones, (10.0, 0.0)) == "outside every inclusion zone of the geofence"
     assert outside((hole,), (10.0, 0.0)) == ""
     assert outside((), (10.0, 0.0)) == ""
+
+
+# Ways
+
+SHAPES = {
+    "triangle": Zone(False, TRIANGLE, 0.0),
+    "arrow": Zone(False, ARROW, 0.0),
+    "circle": Zone(False, ((4.0, 5.0),), 3.0),
+    "small circle": Zone(False, ((4.0, 5.0),), 0.5),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_way_crosses_a_zone_if_a_place_on_it_is_inside(name: str) -> None:
+    """Random ways, each looked at in a thousand places."""
+    zone, rng = SHAPES[name], np.random.default_rng(1)
+    seen = set()
+    for _ in range(60):
+        start, end = rng.uniform(-4.0, 14.0, (2, 2))
+        places = start + np.linspace(0.0, 1.0, 1000)[:, None] * (end - start)
+        inside = any(zone.contains((east, north)) for east, north in places.tolist())
+        assert crosses(zone, (start[0], start[1]), (end[0], end[1])) == inside
+        seen.add(inside)
+    assert seen == {True, False}
+
+
+SQUARE = Zone(False, ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "expected"),
+    [
+        ((1.0, 4.0), (3.0, 4.0), True),  # along a side
+        ((-2.0, 4.0), (6.0, 4.0), True),
+        ((-2.0, 2.0), (2.0, 6.0), True),  # touches a corner
+        ((-2.0, 0.0), (0.0, 0.0), True),  # ends at one
+        ((5.0, 4.0), (9.0, 4.0), False),  # in line with a side, beyond it
+        ((4.0, 5.0), (4.0, 9.0), False),
+        ((-9.0, 4.0), (-5.0, 4.0), False),
+        ((4.0, -9.0), (4.0, -5.0), False),
+        ((5.0, 5.0), (5.0, 5.0), False),  # no way at all
+        ((2.0, 2.0), (2.0, 2.0), True),
+        ((-0.5, 3.0), (0.5, 4.5), True),  # cuts a corner off
+        ((-0.5, 3.5), (0.5, 4.9), False),
+    ],
+)
+def test_ways_along_a_side_and_past_it(
+    start: tuple[float, float], end: tuple[float, float], expected: bool
+) -> None:
+    assert crosses(SQUARE, start, end) == expected
+    assert crosses(SQUARE, end, start) == expected
+
+
+def test_a_way_of_no_length_beside_a_circle() -> None:
+    circle = Zone(False, ((4.0, 5.0),), 3.0)
+    assert not crosses(circle, (8.0, 5.0), (8.0, 5.0))
+    assert crosses(circle, (1.0, 5.0), (1.0, 5.0))  # on its edge
+    assert crosses(circle, (7.0, 0.0), (7.0, 10.0))  # touches it
