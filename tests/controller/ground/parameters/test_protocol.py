@@ -265,6 +265,7 @@ def test_a_file_is_taken_value_by_value() -> None:
     [
         ("GF_ACTION", REAL32, 2.0, (INT32, struct.pack("<i", 2))),
         ("GF_ACTION", REAL32, -2.0, (INT32, struct.pack("<i", -2))),
+        ("CAL_GYRO0_ID", REAL32, 1.5 * 2.0**30, (INT32, struct.pack("<i", 3 * 2**29))),
         ("GF_ACTION", REAL32, 2.5, None),
         ("GF_ACTION", REAL32, math.nan, None),
         ("GF_ACTION", REAL32, 2.0**31, None),
