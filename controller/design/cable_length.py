@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 from scipy.interpolate import BSpline, PPoly
 
-from controller.law.reference import MOST_PIECES, PIECE_ORDER
+from controller.law.reference import MOST_PIECES, OTHER_LAGS, PIECE_ORDER
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Cable
 
@@ -32,17 +32,25 @@ def cable_lag(cable: Cable) -> float:
 
 
 def planned_lengths(tension: Array, duration: float, cable: Cable) -> Array:
-    """Lengths, m, as pieces (MOST_PIECES, 8) over equal shares of the duration (s), in rising powers.
+    """Lengths, m, as pieces (3, MOST_PIECES, 8) over equal shares of the duration (s), in rising powers.
+
+    They are for cables with `OTHER_LAGS` times the lag.
 
     tension: (SAMPLES,), N, evenly spaced; at both ends it has been constant, and remains so. The length is
     the solution of F = k (l - l0) + c l', as a spline that begins at rest and ends in the decay that follows.
     """
     steady = cable.rest_length + tension / cable.stiffness
-    length = lagging(steady, duration / (SAMPLES - 1), cable.damping / cable.stiffness)
+    lag = cable.damping / cable.stiffness
+    return np.array([_lagging_pieces(steady, duration, lag * other) for other in OTHER_LAGS])
+
+
+def _lagging_pieces(steady: Array, duration: float, lag: float) -> Array:
+    """Pieces (MOST_PIECES, 8) of what follows steady (SAMPLES,) with a lag, s."""
+    length = lagging(steady, duration / (SAMPLES - 1), lag)
     columns, at_end = _columns()
     coefficients = np.zeros(columns.shape[1])
     coefficients[:_JOINED] = steady[0]
-    rate = duration * cable.stiffness / cable.damping
+    rate = duration / lag
     rest = length[-1] - steady[-1] if rate < _FASTEST_DECAY * MOST_PIECES else 0.0
     decay = rest * (-rate) ** np.arange(float(_JOINED))
     coefficients[-_JOINED:] = steady[-1] + np.linalg.solve(at_end, decay)

@@ -13,13 +13,14 @@ from controller.design.lqr import Weights, sampled_gain, sampled_model
 from controller.design.model import actuated_model, rotor_time_constant, with_integrator
 from controller.design.names import DESIGNS, ON_ESTIMATE
 from controller.design.remembered import remembered
-from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, LONGEST_DELAY, STATE, Design
+from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, STATE, Design
 from controller.law.flatness import body
 from controller.law.state import (
     BODY_RATES,
     EULER_ANGLES,
     LOAD_POSITION,
     LOAD_VELOCITY,
+    LONGEST_DELAY,
     OWN_STATES,
     STATE_SIZE,
     VEHICLE_POSITION,
@@ -114,7 +115,9 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     """
     emphasis = emphasis_of(vehicle)
     if name == "default":
-        return design_for(vehicle, rate_hz, default_weights(vehicle, emphasis), FEEDFORWARD)
+        record = design_for(vehicle, rate_hz, default_weights(vehicle, emphasis), FEEDFORWARD)
+        record["adapts"] = 1
+        return record
     if name == ON_ESTIMATE:
         return design_for(vehicle, rate_hz, emphasised(estimated_weights(vehicle), emphasis), FEEDFORWARD)
     if name == "paper":

@@ -55,6 +55,8 @@ class Profile(NamedTuple):
     """s"""
     pieces: Array
     """(n, 8): share of the way in each of n equal shares of the duration, in rising powers of its share"""
+    shares: Array
+    """(5, n): share of the way, and its derivatives by the share of the duration, evenly spaced"""
 
 
 class _Basis(NamedTuple):
@@ -121,7 +123,8 @@ def fastest(line: StraightLine, shortest: float) -> Profile:
         if done:
             break
     duration = search.feasible_duration(best, shortest, _CHECKED, best_duration)
-    return Profile(duration, _basis(_SAMPLES).pieces @ best)
+    basis = _basis(_SAMPLES)
+    return Profile(duration, basis.pieces @ best, basis.derivatives @ best)
 
 
 class _Step(NamedTuple):

@@ -18,6 +18,7 @@ from controller.design.cable_length import SAMPLES, cable_lag, lagging, planned_
 from controller.design.fastest import fastest
 from controller.design.limits import Limits, limits_of
 from controller.design.remembered import remembered
+from controller.design.slower import slower
 from controller.design.straight_line import StraightLine, drag_force
 from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
@@ -99,6 +100,7 @@ def _plan_step(path: Path, vehicle: Vehicle, limits: Limits) -> None:
     shortest = SHORTEST_STEP + 3.0 * _slowest_rotor(vehicle)
     motion = fastest(StraightLine(vehicle, way, limits), shortest)
     path["ramp_time"], path["pieces"], path["profile"] = motion.duration, len(motion.pieces), motion.pieces
+    path["slower"] = slower(vehicle, way, limits, motion.shares, motion.duration)
     lag = cable_lag(vehicle.cable)
     if lag > 0.0:
         times = np.linspace(0.0, motion.duration, SAMPLES)

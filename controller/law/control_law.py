@@ -17,14 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.law.adaptation import ADAPTATION, adapted
 from controller.law.flatness import BODY, STENCIL, flat_motion
 from controller.law.reference import path_derivatives
-from controller.law.state import STATE_SIZE, WRENCH_SIZE, Array
+from controller.law.state import LONGEST_DELAY, STATE_SIZE, WRENCH_SIZE, Array
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import ACTUATOR_CONTROLS
-
-LONGEST_DELAY = 64
-"""Most ticks of loop delay that a design can predict over."""
 
 INTEGRATOR, FEEDFORWARD, STATE = 0, 1, 2
 """How the reference enters: through the integrator alone, as a feasible motion, or as x* itself."""
@@ -45,6 +43,7 @@ DESIGN = np.dtype(
         ("anti_windup", "f8", (3, WRENCH_SIZE)),
         ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
         ("hover_wrench", "f8", WRENCH_SIZE),
+        ("adapts", "i8"),  # 1: it finds out what the description gets wrong
         ("body", BODY),
     ]
 )
@@ -57,6 +56,7 @@ MEMORY = np.dtype(
         ("past", "f8", (LONGEST_DELAY, WRENCH_SIZE)),  # deviations from u*, newest first
         ("rotors", "f8", WRENCH_SIZE),  # deviation that lagging rotors give now
         ("ticks", "i8"),  # steps since the law was engaged
+        ("adaptation", ADAPTATION),
     ]
 )
 
@@ -72,6 +72,7 @@ WORK = np.dtype(
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("heading", "f8", 2),  # cosine and sine of the reference's yaw
         ("frame", "f8", (3, 3)),  # rows: x, y, z axes, in the world, of the model that the gains are for
+        ("body", BODY),  # with what was found of it
         ("stencil", STENCIL),
     ]
 )
@@ -152,8 +153,9 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
     work.heading[0], work.heading[1] = math.cos(path.yaw), math.sin(path.yaw)
     if design.entry == FEEDFORWARD:
         # What is commanded now acts after the delay and the rotors' lag, held for a period.
+        adapted(design.body, memory.adaptation, work.body)
         flat_motion(
-            design.body,
+            work.body,
             path,
             t,
             design.lead_time,
@@ -181,7 +183,7 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
         work.deviation[i] = estimate[i] - work.desired[i]
     if design.entry == FEEDFORWARD and (path.pieces > 0 or path.radius > 0.0):
         _thrust_error(work.desired, estimate, work.deviation)
-        upward = work.stencil.pull[2] if design.body.load_mass > 0.0 else work.stencil.force[2]
+        upward = work.stencil.pull[2] if work.body.load_mass > 0.0 else work.stencil.force[2]
         _set_frame(work.heading, upward, work.frame)
     else:
         work.frame[2, 0], work.frame[2, 1], work.frame[2, 2] = 0.0, 0.0, 1.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from controller.law.adaptation import adapt, give, set_pace
 from controller.law.allocation import ALLOCATION, MOST_ROTORS, allocate
 from controller.law.control_law import DESIGN, MEMORY, WORK, remember, step
 from controller.law.reference import PATH
@@ -32,6 +33,9 @@ def control_step(
     A law that has lost itself (a wrench that is not finite) stops the rotors openly: the commands are NaN.
     """
     design, memory, work = designs[0], memories[0], works[0]
+    if design.adapts:
+        adapt(design, memory, estimate)
+        set_pace(design, memory, paths[0])
     step(design, memory, paths[0], estimate, work)
     limited = allocate(allocations[0], work.wrench, controls, work.achieved, work.rotors)
     if not math.isfinite(work.wrench[0] + work.wrench[1] + work.wrench[2] + work.wrench[3]):
@@ -39,4 +43,6 @@ def control_step(
             controls[i] = math.nan
         return 1
     remember(design, memory, work)
+    if design.adapts:
+        give(design, memory, work.achieved[0])
     return 1 if limited else 0

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.law.reference import DERIVATIVES, feasible, piece_at, polynomial
+from controller.law.reference import DERIVATIVES, OTHER_LAGS, derivative, feasible, piece_at
 from controller.law.state import Array
 from sitl_bridge.compiled import kernel
 from sitl_bridge.vehicle.description import Vehicle
@@ -52,6 +52,9 @@ BODY = np.dtype(
         ("rest_length", "f8"),
         ("vehicle_drag", "f8", 2),  # N s/m and N s²/m²
         ("load_drag", "f8", 2),
+        ("pace", "f8"),  # at which it goes along a planned path
+        ("planned_load_mass", "f8"),  # with which a path's lengths were planned
+        ("planned_stiffness", "f8"),
     ]
 )
 
@@ -70,23 +73,67 @@ def body(vehicle: Vehicle, loaded: bool = True) -> np.void:
         cable.rest_length,
         (airframe.drag.linear, airframe.drag.quadratic),
         (load.drag.linear, load.drag.quadratic),
+        1.0,
+        load.mass if loaded else 0.0,
+        cable.stiffness,
     )
     out: np.void = record[0]
     return out
 
 
 @kernel
-def _planned_length(path: Any, t: float, at_rest: float) -> float:
-    """Length of the cable, m, at time t (s) of a path that gives it; `at_rest` is that behind the ramp.
+def _along(b: Any, path: Any, t: float, stencil: Any) -> None:
+    """The stencil's derivatives are those of the path at time t (s), at the body's pace."""
+    feasible(path, t * b.pace, stencil.derivatives, stencil.profile)
+    if b.pace != 1.0:
+        scale = 1.0
+        for k in range(1, DERIVATIVES + 1):
+            scale *= b.pace
+            for i in range(3):
+                stencil.derivatives[k, i] *= scale
 
+
+@kernel
+def _planned_length(b: Any, path: Any, t: float, now: Any, planned: Any) -> float:
+    """Length of the cable, m, at time t (s) of a path that gives it, for a vehicle other than planned for.
+
+    now, planned: tension, N, and its slope, N/s; planned is what the description and the plan's pace give.
     Behind the ramp the tension is constant, and the damper lets the rest of the stretch go.
     """
-    if t < path.ramp_time:
-        share = max(0.0, t) / path.ramp_time
-        piece = piece_at(path.pieces, share)
-        return polynomial(path.lengths[piece], share * path.pieces - piece)
-    last = polynomial(path.lengths[path.pieces - 1], 1.0)
-    return at_rest + (last - at_rest) * math.exp((path.ramp_time - t) / path.cable_lag)
+    lag, planned_lag, ramp_time = b.damping / b.stiffness, path.cable_lag / b.pace, path.ramp_time / b.pace
+    # Between the planned lags: a parabola over their ratio's logarithm.
+    ratio = min(max(math.log(lag / planned_lag) / math.log(OTHER_LAGS[2]), -1.5), 1.5) if lag > 0.0 else -1.5
+    share = max(0.0, t) / ramp_time
+    piece = piece_at(path.pieces, min(1.0, share))
+    stretch = 0.0
+    for i in range(3):
+        length = derivative(path.lengths[i, piece], min(1.0, share) * path.pieces - piece, 0)
+        if t > ramp_time:
+            at_rest = b.rest_length + planned[0] / b.planned_stiffness
+            length = at_rest + (length - at_rest) * math.exp((ramp_time - t) / (OTHER_LAGS[i] * planned_lag))
+        weight = 1.0 - ratio * ratio if i == 1 else 0.5 * ratio * (ratio + i - 1.0)
+        stretch += weight * (length - b.rest_length)
+    # Of (1 + lag d/dt)⁻¹ F/k with another F and k: to first order in F.
+    stretch *= 1.0 - lag * (now[1] / now[0] - planned[1] / planned[0])
+    return float(b.rest_length + stretch * now[0] / planned[0] * b.planned_stiffness / b.stiffness)
+
+
+@kernel
+def _tension(b: Any, r: Array, mass: float, pace: float, pull: Array) -> tuple[float, float]:
+    """Tension (N) and its slope (N/s) for the load's derivatives r (6, 3) at another pace; writes pull."""
+    squared, slope = 0.0, 0.0
+    speed = pace * math.sqrt(r[1, 0] ** 2 + r[1, 1] ** 2 + r[1, 2] ** 2)
+    drag = b.load_drag[0] + b.load_drag[1] * speed
+    along = pace**3 * (r[1, 0] * r[2, 0] + r[1, 1] * r[2, 1] + r[1, 2] * r[2, 2])
+    gaining = b.load_drag[1] * along / speed if speed > 0.0 else 0.0  # the drag coefficient's derivative
+    for i in range(3):
+        velocity, acceleration, jerk = pace * r[1, i], pace**2 * r[2, i], pace**3 * r[3, i]
+        upward = acceleration + (b.gravity if i == 2 else 0.0)
+        pull[i] = mass * upward + drag * velocity
+        squared += pull[i] * pull[i]
+        slope += pull[i] * (mass * jerk + drag * acceleration + gaining * velocity)
+    tension = math.sqrt(squared)
+    return tension, slope / tension
 
 
 @kernel
@@ -100,25 +147,17 @@ def _hang(b: Any, path: Any, t: float, r: Array, load: Array, vehicle: Array, pu
             load[i] = vehicle[i] = r[0, i]
             pull[i] = 0.0
         return
-    squared, slope = 0.0, 0.0
-    speed = math.sqrt(r[1, 0] ** 2 + r[1, 1] ** 2 + r[1, 2] ** 2)
-    drag = b.load_drag[0] + b.load_drag[1] * speed
-    along = r[1, 0] * r[2, 0] + r[1, 1] * r[2, 1] + r[1, 2] * r[2, 2]
-    gaining = b.load_drag[1] * along / speed if speed > 0.0 else 0.0  # the drag coefficient's derivative
-    for i in range(3):
-        upward = r[2, i] + (b.gravity if i == 2 else 0.0)
-        pull[i] = b.load_mass * upward + drag * r[1, i]
-        squared += pull[i] * pull[i]
-        slope += pull[i] * (b.load_mass * r[3, i] + drag * r[2, i] + gaining * r[1, i])
-    tension = math.sqrt(squared)
     if path.cable_lag > 0.0:
-        length = _planned_length(path, t, b.rest_length + tension / b.stiffness)
+        planned = _tension(b, r, b.planned_load_mass, 1.0 / b.pace, pull)
+        tension = _tension(b, r, b.load_mass, 1.0, pull)
+        length = _planned_length(b, path, t, tension, planned)
     else:
+        tension = _tension(b, r, b.load_mass, 1.0, pull)
         # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
-        length = b.rest_length + tension / b.stiffness - b.damping * (slope / tension) / b.stiffness**2
+        length = b.rest_length + tension[0] / b.stiffness - b.damping * tension[1] / b.stiffness**2
     for i in range(3):
         load[i] = r[0, i]
-        vehicle[i] = r[0, i] + length * pull[i] / tension
+        vehicle[i] = r[0, i] + length * pull[i] / tension[0]
 
 
 @kernel
@@ -142,7 +181,7 @@ def _lean(b: Any, path: Any, t: float, heading: Array, stencil: Any) -> None:
     h = STENCIL_STEP
     for j in range(POINTS):
         at = t + (j - POINTS // 2) * h
-        feasible(path, at, stencil.derivatives, stencil.profile)
+        _along(b, path, at, stencil)
         _hang(b, path, at, stencil.derivatives, stencil.load[j], stencil.vehicle[j], stencil.pull[j])
     for j in range(1, POINTS - 1):
         squared = 0.0
@@ -237,9 +276,9 @@ def flat_motion(
     for i in range(18):
         state[i] = 0.0
     state[17] = path.yaw
-    at_rest = path.ramp_time + (POINTS // 2) * h + LAGS_TO_REST * path.cable_lag
+    at_rest = path.ramp_time / b.pace + (POINTS // 2) * h + LAGS_TO_REST * path.cable_lag / b.pace
     if not path.local and path.radius == 0.0 and t > at_rest:
-        feasible(path, t, stencil.derivatives, stencil.profile)
+        _along(b, path, t, stencil)
         _hang(b, path, t, stencil.derivatives, stencil.load[2], stencil.vehicle[2], stencil.pull[2])
         weight = (b.vehicle_mass + b.load_mass) * b.gravity
         for i in range(3):

@@ -28,6 +28,9 @@ MOST_PIECES = 24
 PIECE_ORDER = 8
 """Coefficients of a piece: polynomials of degree 7, which can join with six continuous derivatives."""
 
+OTHER_LAGS = (0.5, 1.0, 2.0)
+"""Of the cable's own, for which its length along a planned profile is given."""
+
 PATH = np.dtype(
     [
         ("start", "f8", 3),  # m, where a feasible path leaves from, at rest
@@ -48,8 +51,13 @@ PATH = np.dtype(
             "f8",
             (MOST_PIECES, PIECE_ORDER),
         ),  # share of the way, in powers of the share of the piece
+        ("slower", "f8", (3, 2)),  # longer ramp, in shares, for what is found to be less and more, see `pace`
         ("cable_lag", "f8"),  # s, of the cable's length behind its tension; 0: `lengths` is not given
-        ("lengths", "f8", (MOST_PIECES, PIECE_ORDER)),  # m, of the cable along the ramp, likewise
+        (
+            "lengths",
+            "f8",
+            (3, MOST_PIECES, PIECE_ORDER),
+        ),  # m, of the cable, likewise, at each of `OTHER_LAGS`
     ]
 )
 
@@ -182,11 +190,14 @@ def piece_at(pieces: int, share: float) -> int:
 
 
 @kernel
-def polynomial(coefficients: Array, x: float) -> float:
-    """Value of a polynomial; coefficients: (PIECE_ORDER,), of rising powers."""
+def derivative(coefficients: Array, x: float, order: int) -> float:
+    """A derivative of a polynomial; coefficients: (PIECE_ORDER,), of rising powers."""
     value = 0.0
-    for power in range(PIECE_ORDER - 1, -1, -1):
-        value = value * x + coefficients[power]
+    for power in range(PIECE_ORDER - 1, order - 1, -1):
+        factor = coefficients[power]
+        for j in range(order):
+            factor *= power - j
+        value = value * x + factor
     return value
 
 
@@ -197,13 +208,7 @@ def profile(path: Any, share: float, out: Array) -> None:
     x = share * path.pieces - piece
     scale = 1.0
     for k in range(DERIVATIVES + 1):
-        value = 0.0
-        for power in range(PIECE_ORDER - 1, k - 1, -1):
-            factor = path.profile[piece, power]
-            for j in range(k):
-                factor *= power - j
-            value = value * x + factor
-        out[k] = value * scale
+        out[k] = scale * derivative(path.profile[piece], x, k)
         scale *= path.pieces
 
 

@@ -22,3 +22,5 @@ OWN_STATES = (0, 1, 2, 6, 7, 8, 12, 13, 14, 15, 16, 17)
 
 WRENCH_SIZE = 4
 """Inputs u = [total thrust (N), moments about body x, y, z (N m)]."""
+LONGEST_DELAY = 64
+"""Most ticks of loop delay that a design can predict over."""
