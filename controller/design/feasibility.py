@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.design.ramp import LARGEST_THRUST, STEEPEST, Demand, demand_of_circle, planned
-from controller.law.reference import Path, circle
+from controller.law.reference import Path
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 from sitl_bridge.vehicle.rotors import Rotor, full_thrust, rotor_effect
 
@@ -130,8 +130,8 @@ def _circle(path: Path, vehicle: Vehicle) -> list[str]:
         excess = f"the load would be {entry:.0f} s on its way to it, {LONGEST_ENTRY:g} s at most"
 
     def flown(of_radius: float, at_rate: float) -> bool:
-        start, centre = path["start"][0], path["centre"][0]
-        other = circle(tuple(centre.tolist()), of_radius, at_rate, tuple(start.tolist()))
+        other = path.copy()
+        other["radius"], other["angular_rate"] = of_radius, at_rate
         if at_rate > fastest or _excess(demand_of_circle(other, vehicle)) is not None:
             return False
         return float(planned(other, vehicle)["ramp_time"][0]) <= LONGEST_ENTRY

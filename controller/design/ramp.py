@@ -180,14 +180,9 @@ def _slowest_rotor(vehicle: Vehicle) -> float:
 
 def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:
     """Position (n, 3), m, velocity and acceleration of the feasible path at the times (n,)."""
-    radius, rate = float(path["radius"][0]), float(path["angular_rate"][0])
-    away = []
-    for order in range(3):
-        phase = rate * times + order * math.pi / 2.0
-        columns = (np.sin(phase), np.cos(phase), np.zeros(len(times)))
-        away.append(radius * rate**order * np.stack(columns, axis=1))
     start = path["start"][0]
-    away[0] = away[0] + path["centre"][0] - start
+    away = _of_path(path, times)
+    away[0] -= start
     if ramp_time <= 0.0:
         return start + away[0], away[1], away[2]
     w = [share[:, None] / ramp_time**order for order, share in enumerate(_shares(path, times / ramp_time))]
@@ -196,6 +191,22 @@ def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, A
         w[1] * away[0] + w[0] * away[1],
         w[2] * away[0] + 2.0 * w[1] * away[1] + w[0] * away[2],
     )
+
+
+def _of_path(path: Path, times: Array) -> Array:
+    """Position of the path itself and its first two derivatives (3, n, 3)."""
+    radius, rate, climb = (float(path[name][0]) for name in ("radius", "angular_rate", "climb"))
+    rising = (climb * times, np.full(len(times), climb), np.zeros(len(times)))
+    out = []
+    for order in range(3):
+        ahead = order * math.pi / 2.0
+        east = radius * rate**order * np.sin(rate * times + ahead)
+        north = radius * rate**order * np.cos(rate * times + ahead)
+        if path["crossing"][0]:
+            north = 0.5 * radius * (2.0 * rate) ** order * np.sin(2.0 * rate * times + ahead)
+        out.append(np.stack([east, north, rising[order]], axis=1))
+    out[0] = out[0] + path["centre"][0]
+    return np.array(out)
 
 
 def _shares(path: Path, times: Array) -> Array:

@@ -37,6 +37,8 @@ PATH = np.dtype(
         ("centre", "f8", 3),  # m, the set-point, or the circle's centre
         ("radius", "f8"),  # m, 0 for a set-point
         ("angular_rate", "f8"),  # rad/s
+        ("crossing", "i8"),  # 1: a figure eight instead of a circle
+        ("climb", "f8"),  # m/s, of a helix
         ("ramp_time", "f8"),  # s, in which a feasible path goes over from the start to the path
         ("yaw", "f8"),  # rad
         ("yaw_rate", "f8"),  # rad/s
@@ -108,6 +110,32 @@ def circle(
     return path
 
 
+def figure_eight(
+    centre: tuple[float, float, float],
+    radius: float,
+    angular_rate: float,
+    start: tuple[float, float, float],
+) -> Path:
+    """Gerono's lemniscate: centre + radius·(sin wt, sin(2wt)/2, 0), w in rad/s. Shape (1,)."""
+    path = circle(centre, radius, angular_rate, start)
+    path["crossing"] = 1
+    path["ramp_time"] = _ramp_time(path)
+    return path
+
+
+def helix(
+    centre: tuple[float, float, float],
+    radius: float,
+    angular_rate: float,
+    climb: float,
+    start: tuple[float, float, float],
+) -> Path:
+    """A circle that climbs (m/s) for as long as the flight lasts: centre is that of its lowest turn."""
+    path = circle(centre, radius, angular_rate, start)
+    path["climb"] = climb
+    return path
+
+
 def local_path() -> Path:
     """A path (1,) that is the Taylor polynomial of `motion` around `epoch`, which its owner writes."""
     path = np.zeros(1, dtype=PATH)
@@ -125,7 +153,7 @@ SHORTEST_RAMP = 2.0
 
 def _ramp_time(path: Path) -> float:
     """How long a feasible path takes from its start to the path itself, s."""
-    begin = np.array([0.0, path["radius"][0], 0.0])
+    begin = np.array([0.0, 0.0 if path["crossing"][0] else path["radius"][0], 0.0])
     distance = float(np.linalg.norm(path["centre"][0] + begin - path["start"][0]))
     return max(
         SHORTEST_RAMP,
@@ -152,13 +180,19 @@ def path_derivatives(path: Any, t: float, out: Array) -> None:
         _taylor(path.motion, t - path.epoch, out)
         return
     quarter = 0.5 * math.pi
-    power = path.radius
+    power, doubled = path.radius, 0.5 * path.radius
     for k in range(DERIVATIVES + 1):
         phase = path.angular_rate * t + k * quarter
         out[k, 0] = power * math.sin(phase)
-        out[k, 1] = power * math.cos(phase)
+        if path.crossing:
+            out[k, 1] = doubled * math.sin(2.0 * path.angular_rate * t + k * quarter)
+        else:
+            out[k, 1] = power * math.cos(phase)
         out[k, 2] = 0.0
         power *= path.angular_rate
+        doubled *= 2.0 * path.angular_rate
+    out[0, 2] = path.climb * t
+    out[1, 2] = path.climb
     for i in range(3):
         out[0, i] += path.centre[i]
 

@@ -72,6 +72,39 @@ class Circle(Section):
         return _agile(circle(self.centre, self.radius, self.angular_rate, start), self.agility)
 
 
+class FigureEight(Section):
+    """The load flies an eight: centre + radius·(sin wt, sin(2wt)/2, 0)."""
+
+    kind: Literal["figure-eight"]
+    centre: Vector = quantity("m", "world ENU, where it crosses itself")
+    radius: float = quantity("m", "from the centre to either end", gt=0, le=1e3)
+    angular_rate: float = quantity("rad/s", "w: an eight takes 2π/w", ge=-10, le=10)
+    agility: float | None = _agility()
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import figure_eight
+
+        return _agile(figure_eight(self.centre, self.radius, self.angular_rate, start), self.agility)
+
+
+class Helix(Section):
+    """The load goes round and climbs: centre + radius·(sin wt, cos wt, 0) + (0, 0, climb·t)."""
+
+    kind: Literal["helix"]
+    centre: Vector = quantity("m", "world ENU, of its lowest turn")
+    radius: float = quantity("m", "of the circle", gt=0, le=1e3)
+    angular_rate: float = quantity("rad/s", "w", ge=-10, le=10)
+    climb: float = quantity("m/s", "upwards, all the time", gt=0, le=20)
+    agility: float | None = _agility()
+
+    def path(self, start: Vector) -> Path:
+        """The reference path for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import helix
+
+        return _agile(helix(self.centre, self.radius, self.angular_rate, self.climb, start), self.agility)
+
+
 def _agile(path: Path, agility: float | None) -> Path:
     """The path, with an agility other than the usual one if there is one."""
     if agility is not None:
@@ -86,7 +119,8 @@ class GroundControl(Section):
 
 
 Overrides = Sequence[str | Override]
-Reference = Annotated[Hover | Setpoint | Circle | GroundControl, Field(discriminator="kind")]
+Moving = Setpoint | Circle | FigureEight | Helix
+Reference = Annotated[Hover | Moving | GroundControl, Field(discriminator="kind")]
 
 
 class Scenario(Section):
@@ -108,9 +142,10 @@ def with_agility(scenario: Scenario, agility: float | None) -> Scenario:
     """The scenario with another agility of its reference; None: as it is. Raises DescriptionError."""
     if agility is None:
         return scenario
-    if not isinstance(scenario.reference, Setpoint | Circle):
+    if not isinstance(scenario.reference, Moving):
         raise DescriptionError(
-            "--agility", [f"a {scenario.reference.kind} reference has none; expected a set-point or a circle"]
+            "--agility",
+            [f"a {scenario.reference.kind} reference has none; expected one that the load goes to"],
         )
     reference = scenario.reference.model_copy(update={"agility": agility})
     return scenario.model_copy(update={"reference": reference})

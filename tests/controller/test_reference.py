@@ -15,6 +15,8 @@ from controller.law.reference import (
     Path,
     circle,
     feasible,
+    figure_eight,
+    helix,
     path_derivatives,
     setpoint,
 )
@@ -23,7 +25,12 @@ from tests.controller.fleet import attributes
 
 coordinate = st.floats(-20.0, 20.0)
 points = st.tuples(coordinate, coordinate, coordinate)
-paths = st.builds(circle, points, st.floats(0.0, 10.0), st.floats(-2.0, 2.0), points)
+_round = (points, st.floats(0.0, 10.0), st.floats(-2.0, 2.0))
+paths = st.one_of(
+    st.builds(circle, *_round, points),
+    st.builds(figure_eight, *_round, points),
+    st.builds(helix, *_round, st.floats(0.0, 3.0), points),
+)
 
 
 def at(path: Path, t: float) -> Array:
