@@ -23,7 +23,7 @@ MORE_TILT, MORE_THRUST = 1.1, 1.05
 SLIGHT_TILT = 0.1
 """rad, that is no matter: a motion straight up asks for none."""
 _SAMPLES = 300
-_GOAL = ("centre", "radius", "angular_rate", "agility", "unhurried", "local")
+_GOAL = ("centre", "radius", "angular_rate", "crossing", "climb", "agility", "unhurried", "local")
 
 
 class PreparedMotion:

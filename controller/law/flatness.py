@@ -119,9 +119,12 @@ def _planned_length(b: Any, path: Any, t: float, now: Any, planned: Any) -> floa
 
 
 @kernel
-def _tension(b: Any, r: Array, mass: float, pace: float, pull: Array) -> tuple[float, float]:
-    """Tension (N) and its slope (N/s) for the load's derivatives r (6, 3) at another pace; writes pull."""
-    squared, slope = 0.0, 0.0
+def _tension(b: Any, r: Array, mass: float, pace: float, pull: Array) -> tuple[float, float, float]:
+    """Tension, N, and two derivatives for the load's derivatives r (6, 3) at another pace; writes pull.
+
+    The second one leaves out how the drag coefficient's slope changes.
+    """
+    squared, slope, bend = 0.0, 0.0, 0.0
     speed = pace * math.sqrt(r[1, 0] ** 2 + r[1, 1] ** 2 + r[1, 2] ** 2)
     drag = b.load_drag[0] + b.load_drag[1] * speed
     along = pace**3 * (r[1, 0] * r[2, 0] + r[1, 1] * r[2, 1] + r[1, 2] * r[2, 2])
@@ -131,9 +134,13 @@ def _tension(b: Any, r: Array, mass: float, pace: float, pull: Array) -> tuple[f
         upward = acceleration + (b.gravity if i == 2 else 0.0)
         pull[i] = mass * upward + drag * velocity
         squared += pull[i] * pull[i]
-        slope += pull[i] * (mass * jerk + drag * acceleration + gaining * velocity)
+        pulling = mass * jerk + drag * acceleration + gaining * velocity
+        bending = mass * pace**4 * r[4, i] + drag * jerk + 2.0 * gaining * acceleration
+        slope += pull[i] * pulling
+        bend += pulling * pulling + pull[i] * bending
     tension = math.sqrt(squared)
-    return tension, slope / tension
+    slope /= tension
+    return tension, slope, (bend - slope * slope) / tension
 
 
 @kernel
@@ -153,8 +160,10 @@ def _hang(b: Any, path: Any, t: float, r: Array, load: Array, vehicle: Array, pu
         length = _planned_length(b, path, t, tension, planned)
     else:
         tension = _tension(b, r, b.load_mass, 1.0, pull)
-        # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order.
-        length = b.rest_length + tension[0] / b.stiffness - b.damping * tension[1] / b.stiffness**2
+        # l = l_0 + F/k - (c/k) l', with l' = F'/k to first order, along a path of known snap to second.
+        lag = b.damping / b.stiffness
+        bend = 0.0 if path.local else lag * tension[2]
+        length = b.rest_length + (tension[0] - lag * (tension[1] - bend)) / b.stiffness
     for i in range(3):
         load[i] = r[0, i]
         vehicle[i] = r[0, i] + length * pull[i] / tension[0]

@@ -65,11 +65,13 @@ def test_the_papers_step_with_another_load_and_cable(length: float, wrong: list[
     assert flight.summary["overshoot_pct"] < 0.5
 
 
-@pytest.mark.parametrize("length", [1.0, 10.0])
 @pytest.mark.parametrize("wrong", [[], HEAVY, LIGHT], ids=["nominal", "heavy", "light"])
-def test_the_circle_with_another_load_and_cable(length: float, wrong: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("scenario", "length"), [("circle", 1.0), ("circle", 10.0), ("figure-eight", 10.0), ("helix", 1.0)]
+)
+def test_paths_with_another_load_and_cable(scenario: str, length: float, wrong: list[str]) -> None:
     flight = sitl.fly(
-        "circle", overrides=[f"cable.rest_length={length}"], plant_overrides=wrong, duration_s=16.0
+        scenario, overrides=[f"cable.rest_length={length}"], plant_overrides=wrong, duration_s=16.0
     )
     load = np.stack([flight.states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
     errors = np.linalg.norm(load - flight.reference, axis=1)[flight.states["time_s"] >= 12.0]
