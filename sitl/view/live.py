@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from sitl.view.listener import Listener
+from sitl.view.many_senders import ManySenders
 from sitl.view.page.panel import Panel
 from sitl.view.page.scene import Scene
 from sitl.view.page.steering import Steering
@@ -41,7 +42,8 @@ def watch(
     links: list[Link] = []
     try:
         for address in addresses:
-            links.append(open_link(address, lambda text: None))
+            many = address.kind == "udpin"
+            links.append(ManySenders(address) if many else open_link(address, lambda text: None))
         _loop(links, listener, scene, panel, steering, way, stop)
     finally:
         for link in links:
