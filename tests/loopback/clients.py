@@ -125,7 +125,7 @@ class MavProxy:
         self._out = self.log.open("wb")
         self._process = subprocess.Popen(
             [str(program), f"--master={master}", "--nowait", f"--state-basedir={folder}", "--default-modules="
-             "mode,arm,param,ftp,wp,cmdlong,misc,link,signing,rc"],
+             "mode,arm,param,ftp,wp,fence,rally,log,cmdlong,misc,link,signing,rc"],
             stdin=subprocess.PIPE,
             stdout=self._out,
             stderr=subprocess.STDOUT,

@@ -164,13 +164,30 @@ async def mavsdk_flight(connection: str) -> None:
 WAYPOINTS = """QGC WPL 110
 0	1	3	16	0	1	0	0	47.397782	8.545594	5	1
 1	0	3	16	0	1	0	0	47.397782	8.545654	6	1
-2	0	3	16	0	1	0	0	47.397742	8.545654	5	1
+2	0	3	201	3	0	0	0	47.398	8.546	0	1
+3	0	2	2000	0	1	0	0	0	0	0	1
+4	0	2	112	1	0	0	0	0	0	0	1
+5	0	2	211	1	2	0	0	0	0	0	1
+6	0	3	16	0	1	0	0	47.397742	8.545654	5	1
+7	0	2	42600	1	1	0.3	0.5	0	0	0	1
+8	0	2	42600	1	6	0	0	0	0	0	1
+"""
+"""Way-points, a region of interest, a camera that is not there, a condition, gripper and winch"""
+FENCE = """QGC WPL 110
+0	0	3	5001	3	0	0	0	47.3970	8.5440	0	1
+1	0	3	5001	3	0	0	0	47.3970	8.5470	0	1
+2	0	3	5001	3	0	0	0	47.3990	8.5456	0	1
+3	0	3	5004	5	0	0	0	47.3981	8.5456	0	1
+"""
+RALLY = """QGC WPL 110
+0	0	3	5100	0	0	0	0	47.39780	8.54570	20	1
 """
 
 
 def mavproxy_flight(master: str, folder: Path) -> None:
-    """Parameters, a mission, arming, take-off, mission, landing, as a person types them."""
-    (folder / "plan.txt").write_text(WAYPOINTS)
+    """Parameters, fence, rally, logs, arming, take-off, mission, landing, as a person types them."""
+    for name, text in (("plan", WAYPOINTS), ("fence", FENCE), ("rally", RALLY)):
+        (folder / f"{name}.txt").write_text(text)
     proxy = MavProxy(master, folder)
     try:
         at = proxy.wait_for("parameters (ftp)")
@@ -182,6 +199,13 @@ def mavproxy_flight(master: str, folder: Path) -> None:
         at = proxy.wait_for("4.5", after=at)
         proxy.say("param set GF_ACTION 77")
         at = proxy.wait_for("GF_ACTION = 77: allowed", after=at)
+        for kind, first in (("fence", "5001 3 47.397"), ("rally", "5100 3 47.397")):
+            proxy.say(f"{kind} load {kind}.txt")
+            at = proxy.wait_for(f"TYPE_{kind.upper()}: ACCEPTED", after=at)
+            proxy.say(f"{kind} list")
+            at = proxy.wait_for(first, after=at)
+        proxy.say("log list")
+        at = proxy.wait_for("numLogs", after=at)
         proxy.say("wp load plan.txt")
         at = proxy.wait_for("TYPE_MISSION: ACCEPTED", after=at)
         proxy.say("wp list")
@@ -196,7 +220,7 @@ def mavproxy_flight(master: str, folder: Path) -> None:
         proxy.say("long DO_SET_MODE 1 4 4")
         at = proxy.wait_for("Mission finished", LONG_PATIENCE, after=at)
         proxy.say("wp set 9")
-        at = proxy.wait_for("Mission item 9 does not exist; there are 3", after=at)
+        at = proxy.wait_for("Mission item 9 does not exist; there are 9", after=at)
         proxy.say("wp set 1")
         at = proxy.wait_for("waypoint 1", after=at)
         proxy.say("wp clear")
