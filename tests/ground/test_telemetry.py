@@ -9,7 +9,8 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.telemetry.message_rates import STREAMABLE
-from controller.ground.telemetry.messages import CAPABILITIES, cell_voltages
+from controller.ground.telemetry.messages import CAPABILITIES
+from controller.ground.telemetry.state_messages import cell_voltages
 from controller.ground.telemetry.vehicle_state import Gps, profile_of
 from sitl_bridge.frames import Geodetic, quaternion_from_euler
 from sitl_bridge.vehicle.files import load_vehicle
