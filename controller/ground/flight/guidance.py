@@ -16,18 +16,17 @@ from controller.ground.flight.limits.fence import Fence, fence_around
 from controller.ground.flight.limits.fence_zones import Place, Zone
 from controller.ground.flight.mission_flight import MissionFlight, Then
 from controller.ground.flight.motion.follow_target import FollowTarget
+from controller.ground.flight.motion.following import Following, height_of
 from controller.ground.flight.motion.geometry import (
     above,
     below,
     controlled_body,
-    hanging_under,
+    controlled_point,
     limited_speed,
-    limited_velocity,
     stopping_point,
-    too_deep,
 )
 from controller.ground.flight.motion.patterns import Orbit, Pattern, Yaw
-from controller.ground.flight.motion.setpoint_types import Attitude, Body, Follow, Goto, Idle, Target
+from controller.ground.flight.motion.setpoint_types import Attitude, Body, Goto, Idle, Target
 from controller.ground.flight.motion.trajectory import motion_pole
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
 from controller.ground.flight.stages.ascent import Ascent, Step
@@ -40,16 +39,10 @@ from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
-_AT_FLOOR = 0.01
-"""m, by which a set-point's height may be below the floor without a word"""
 _LIFTING = 0.5
 """Share of the hover thrust below which a vehicle on the ground stays there"""
-_LONGEST_DRIVE = 0.2
-"""s between two looks for which an acceleration drives on"""
 _NEAR = 1.0
 """m, within which a vehicle hovers where it is to hover"""
-_STAY_AT_FLOOR = 0.3
-"""m above the room that a stop needs, within which a body that stops at the floor goes on to"""
 
 
 class Stage(Enum):
@@ -111,11 +104,7 @@ class Guidance:
         """m, of `_point_of` in HOLD and while waiting"""
         self._point_of = Body.LOAD
         self._yaw = 0.0
-        self._at_floor = False
-        """The offboard client asks for less height than there may be, and has been told"""
-        self._driven_speed: Triple = (math.nan, math.nan, math.nan)
-        self._driven_at = -math.inf
-        """m/s and s of the plant's time, of axes that only an acceleration drives"""
+        self._following = Following(profile, parameters, self.fence, pilot.say)
         self.pattern: Pattern | None = None
         """An orbit in ORBIT, a figure of eight in HOLD"""
         self.followed = FollowTarget()
@@ -181,7 +170,7 @@ class Guidance:
     def hold_here(self, view: VehicleView) -> None:
         """Come to rest, and stay."""
         x, y, z = stopping_point(view, self._parameters, self._pole)
-        least = min(self._floor(view), self._height(view))
+        least = min(self._following.floor(view), height_of(view))
         self._stay_at((x, y, max(z, least)), controlled_body(view))
         self._yaw = euler_from_quaternion(view.attitude)[2]
         self.speed = math.nan
@@ -220,7 +209,7 @@ class Guidance:
         """Begin a mode in flight, from where the vehicle holds."""
         self.speed = math.nan
         self._return = None
-        self._at_floor = False
+        self._following.start()
         if mode is Mode.MISSION:
             self._mission.start()
         elif mode is Mode.FOLLOW_TARGET:
@@ -391,8 +380,7 @@ class Guidance:
 
     def _controlled(self, vehicle: Triple, view: VehicleView) -> Triple:
         """The controlled body's point for a vehicle's point."""
-        loaded = controlled_body(view) is Body.LOAD
-        return below(vehicle, self._profile.hover_length) if loaded else vehicle
+        return controlled_point(vehicle, view, self._profile)
 
     def _return_home(self, view: VehicleView) -> Target:
         if self._return is None:
@@ -463,65 +451,8 @@ class Guidance:
         self.speed = math.nan
 
     def _follow(self, asked: Setpoint, view: VehicleView) -> Target:
-        position, velocity = asked.position, limited_velocity(asked.velocity, self._parameters)
-        if view.load_attached is not asked.of_load:  # a lost load's: from above where it would be
-            under = hanging_under(asked.acceleration, self._profile)
-            way = -1.0 if view.load_attached else 1.0
-            x, y, z = (p + way * d for p, d in zip(position, under, strict=True))
-            position = (x, y, z)
-        acceleration = asked.acceleration
-        velocity = self._driven(position, velocity, acceleration, view)
-        if math.isnan(position[2]):
-            deep = self._goes_too_deep(velocity[2], view)
-        else:
-            deep = self._note_depth(position[2] < self._floor(view) - _AT_FLOOR, view)
-        if deep:
-            position = (position[0], position[1], self._floor(view))
-            velocity, acceleration = (*velocity[:2], 0.0), (*acceleration[:2], math.nan)
-        plain = all(math.isnan(v) for v in (*asked.velocity, *asked.acceleration, asked.yaw_rate))
         self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
-        body = controlled_body(view)
-        if plain:
-            self._stay_at(position, body)
-            return Goto(body, position, self._yaw, self._parameters["MPC_XY_VEL_MAX"])
-        return Follow(body, position, velocity, acceleration, asked.yaw, asked.yaw_rate)
-
-    def _driven(self, position: Triple, velocity: Triple, acceleration: Triple, view: VehicleView) -> Triple:
-        """Velocities, also on axes that only have an acceleration: what there was, driven on by it."""
-        own = view.load_velocity if view.load_attached else view.velocity
-        step = view.time - self._driven_at
-        before = self._driven_speed if 0.0 <= step <= _LONGEST_DRIVE else (math.nan,) * 3
-        step = min(max(step, 0.0), _LONGEST_DRIVE)
-        driven = []
-        for p, v, a, last, now in zip(position, velocity, acceleration, before, own, strict=True):
-            alone = math.isnan(p) and math.isnan(v) and not math.isnan(a)
-            driven.append((now if math.isnan(last) else last + a * step) if alone else math.nan)
-        x, y, z = (v if math.isnan(d) else d for v, d in zip(velocity, driven, strict=True))
-        limited = limited_velocity((x, y, z), self._parameters)
-        a, b, c = (math.nan if math.isnan(d) else v for d, v in zip(driven, limited, strict=True))
-        self._driven_speed, self._driven_at = (a, b, c), view.time
-        return limited
-
-    def _height(self, view: VehicleView) -> float:
-        """Of the controlled body, m ENU."""
-        return (view.load_position if view.load_attached else view.position)[2]
-
-    def _floor(self, view: VehicleView) -> float:
-        """Least height of the controlled body, m ENU; -inf without a ground."""
-        fence = self.fence(view.load_attached)
-        return self._controlled((0.0, 0.0, fence.home[2] + fence.least_height), view)[2]
-
-    def _goes_too_deep(self, velocity: float, view: VehicleView) -> bool:
-        """Whether a set-point's upward velocity (m/s) has to end at the floor now; says so once."""
-        room = self._height(view) - self._floor(view) - (_STAY_AT_FLOOR if self._at_floor else 0.0)
-        own = (view.load_velocity if view.load_attached else view.velocity)[2]
-        return self._note_depth(too_deep(velocity, own, room, self._parameters, self._pole), view)
-
-    def _note_depth(self, deep: bool, view: VehicleView) -> bool:
-        """Whether a set-point is too deep, told once for each time that it becomes so."""
-        if deep and not self._at_floor:
-            least = self.fence(view.load_attached).least_height
-            text = f"Set-point goes down too far: held {least:.1f} m above home (LND_CLEARANCE)"
-            self._pilot.say(WARNING, text)
-        self._at_floor = deep
-        return deep
+        target = self._following.target(asked, view, self._yaw)
+        if isinstance(target, Goto):
+            self._stay_at(target.position, target.body)
+        return target

@@ -31,6 +31,11 @@ def controlled_body(view: VehicleView | None) -> Body:
     return Body.LOAD if view is None or view.load_attached else Body.VEHICLE
 
 
+def controlled_point(vehicle: Triple, view: VehicleView, profile: Profile) -> Triple:
+    """The controlled body's point for a vehicle's point, m."""
+    return below(vehicle, profile.hover_length) if controlled_body(view) is Body.LOAD else vehicle
+
+
 def filled(asked: Triple, here: Triple) -> Triple:
     """What is NaN stays as it is."""
     x, y, z = (old if math.isnan(new) else new for new, old in zip(asked, here, strict=True))
