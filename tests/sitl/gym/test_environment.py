@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -46,6 +48,13 @@ def test_gymnasiums_checker_is_content(name: str, actions: str, observation: str
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
+
+
+def test_an_id_with_its_module_needs_no_import() -> None:
+    """In a process of its own: this one has imported the environments."""
+    script = "import gymnasium; print(gymnasium.make('sitl.gym:sitl/Position-v0').spec.id)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "sitl/Position-v0", done.stderr
 
 
 @pytest.mark.parametrize("observation", ["truth", "sensors"])
