@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from sitl.studies.paper import independent_simulation as second
-from sitl.studies.paper import linear, motions, page, riccati, sampling
+from sitl.studies.paper import elasticity, linear, motions, page, riccati, sampling
 from sitl.studies.paper.position import vehicle_with
 from sitl.studies.paper.record import (
     CORRECTED,
@@ -323,3 +323,10 @@ def test_second_simulation_hovers() -> None:
     vehicle = load_vehicle("paper")
     rate = second.derivative(vehicle, second.initial_state(vehicle), (vehicle.hover_thrust, 0.0, 0.0, 0.0))
     assert np.abs(rate).max() < 1e-12
+
+
+@pytest.mark.parametrize("key", [*elasticity.OTHERS, "cable.stiffness"])
+def test_a_sweep_draws_the_vehicles_that_it_says(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = elasticity.STIFFNESSES if key == "cable.stiffness" else elasticity.OTHERS[key][1]
+    monkeypatch.setattr(elasticity, "respond", lambda vehicle: vehicle)
+    assert elasticity.swept(key, values) == {value: elasticity.on(f"{key}={value!r}") for value in values}

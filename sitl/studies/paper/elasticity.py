@@ -23,6 +23,9 @@ from sitl.studies.paper.page import Cell
 from sitl.studies.paper.position import TARGET, law
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
 from sitl.studies.paper.sampling import held, spectral_radius
+from sitl.studies.sweep.draws import draws
+from sitl.studies.sweep.study import Study, Vary
+from sitl.studies.sweep.worker import drawn
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
 
@@ -192,6 +195,14 @@ def on(*overrides: str) -> Vehicle:
     return load_vehicle("paper", [*BASE, *overrides])
 
 
+def swept(key: str, values: Sequence[float]) -> dict[float, Response]:
+    """V.B for each value of a key of the vehicle: a study as `sitl sweep` draws it, simulated offline."""
+    varied = Vary(key=key, values=tuple(values))
+    study = Study(name=f"V.B over {key}", scenario="setpoint", designs=("paper",), vary=(varied,))
+    plain = study.model_dump(mode="json")
+    return {draw.inputs[key]: respond(drawn(plain, draw.inputs).told) for draw in draws(study)}
+
+
 def settling_by_continuous_law(vehicle: Vehicle) -> float:
     """2 % settling time, s, of V.B with the paper's continuous gains, in the second simulation."""
     times = np.linspace(0.0, DURATION, round(DURATION * RATE_HZ) + 1)
@@ -233,7 +244,7 @@ def _stiffness(context: Context) -> str:
     ledger = context.ledger
     context.say("elasticity: stiffness")
     stiffnesses = FEW_STIFFNESSES if context.quick else STIFFNESSES
-    responses = {k: respond(on(f"cable.stiffness={k!r}")) for k in stiffnesses}
+    responses = swept("cable.stiffness", stiffnesses)
     ledger.rows("elasticity", len(responses))
     for i, (k, r) in enumerate(responses.items()):
         ledger.put(f"elasticity.{i}.stiffness_N_m", k, "N/m", CHOSEN)
@@ -356,10 +367,9 @@ def _others(context: Context) -> str:
         parameter = key.replace(".", "_")
         name = f"elasticity_over.{parameter}"
         ledger.rows(name, len(some))
-        for i, value in enumerate(some):
+        for i, (value, response) in enumerate(swept(key, some).items()):
             vehicle = on(f"{key}={value!r}")
             ledger.put(f"{name}.{i}.{parameter}", value, "", CHOSEN)
-            response = respond(vehicle)
             record(ledger, f"{name}.{i}", vehicle, response)
             cells: list[str | Cell] = [Cell(f"{name}.{i}.{column}") for column in ROW]
             if response.diverged:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,7 +38,23 @@ def fly_draw(study: dict[str, Any], draw: dict[str, Any], logs: str | None) -> d
     return row
 
 
-def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Flight:
+class Drawn(NamedTuple):
+    """What a draw makes of its study's scenario."""
+
+    scenario: Scenario
+    vehicle: Vehicle | str | None
+    """None: the scenario's."""
+    overrides: list[str]
+    plant_overrides: list[str]
+
+    @property
+    def told(self) -> Vehicle:
+        """The vehicle as the controller is told."""
+        return scenario_vehicle(self.scenario, self.vehicle, self.overrides)
+
+
+def drawn(study: dict[str, Any], draw: dict[str, Any]) -> Drawn:
+    """Apply a draw. study: a `Study` as plain values. Raises DescriptionError."""
     overrides: list[str] = list(study["set"])
     plant_overrides: list[str] = []
     scenario = load_scenario(study["scenario"])
@@ -57,12 +73,17 @@ def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Fligh
             scenario = with_reference(scenario, key.removeprefix("reference."), value)
         elif key not in (*OWN_KEYS, "random_vehicle"):
             overrides.append(f"{key}={_toml(value)}")
+    return Drawn(scenario, vehicle, overrides, plant_overrides)
+
+
+def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Flight:
+    found = drawn(study, draw)
     duration = draw.get("duration", study["duration"])
     return fly(
-        scenario,
-        vehicle=vehicle,
-        overrides=overrides,
-        plant_overrides=plant_overrides,
+        found.scenario,
+        vehicle=found.vehicle,
+        overrides=found.overrides,
+        plant_overrides=found.plant_overrides,
         seed=int(draw["seed"]),
         design=str(draw["design"]),
         feedback=draw.get("feedback"),
