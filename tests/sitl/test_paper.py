@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import elasticity, linear, motions, page, riccati, sampling
+from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper.position import vehicle_with
 from sitl.studies.paper.record import (
     CORRECTED,
