@@ -28,7 +28,7 @@ class Way:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """(n, 3), m: one round of a circle; of a set-point, the straight line to it."""
+        """(n, 3), m: one round of a circle, figure eight or helix; else the straight line to the point."""
         if self._path is None:
             return np.zeros((0, 3))
         record = self._path[0]
