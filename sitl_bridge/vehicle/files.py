@@ -17,6 +17,7 @@ from sitl_bridge.vehicle.errors import DescriptionError, Location, did_you_mean,
 from sitl_bridge.vehicle.overrides import Override, apply_overrides
 from sitl_bridge.vehicle.physics import PhysicsFault, physics_faults
 from sitl_bridge.vehicle.schema import Section
+from sitl_bridge.vehicle.sensors import Sensors
 from sitl_bridge.vehicle.toml_lines import line_of
 
 __all__ = [
@@ -102,13 +103,15 @@ def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = (
     A complete vehicle can be changed by overrides, too. Raises DescriptionError, with one line for each
     fault.
     """
+    changes = [o if isinstance(o, Override) else Override(o) for o in overrides]
+    said_by = _origin("", changes)(("sensors", "preset"))
     if isinstance(vehicle, Vehicle):
         source, content = vehicle.name, vehicle.model_dump(mode="json", exclude_none=True)
+        if said_by:
+            content["sensors"] = _own_sensors(content["sensors"])
     else:
         source, content = read_toml(vehicle, resources.files("sitl_bridge") / "vehicles", "vehicle")
-    changes = [o if isinstance(o, Override) else Override(o) for o in overrides]
     apply_overrides(content, changes)
-    said_by = _origin("", changes)(("sensors", "preset"))
     return validated(Vehicle, completed(content, "" if said_by else source), source, _origin(source, changes))
 
 
@@ -134,6 +137,24 @@ def _on_preset(sensors: dict[str, Any], source: str) -> dict[str, Any]:
         source, below = read_toml(name, resources.files("sitl_bridge") / "presets", "preset")
         complete = _merged(below, complete)
     return complete
+
+
+def _own_sensors(sensors: dict[str, Any]) -> dict[str, Any]:
+    """What a complete vehicle's sensors have that is not of the preset which they name."""
+    preset = validated(Sensors, _on_preset({"preset": sensors["preset"]}, ""), str(sensors["preset"]))
+    return _differences(preset.model_dump(mode="json", exclude_none=True), sensors)
+
+
+def _differences(base: dict[str, Any], table: dict[str, Any]) -> dict[str, Any]:
+    """The values of nested tables that are not those of the base."""
+    out: dict[str, Any] = {}
+    for key, value in table.items():
+        old = base.get(key)
+        if isinstance(old, dict) and isinstance(value, dict):
+            out[key] = _differences(old, value)
+        elif value != old:
+            out[key] = value
+    return out
 
 
 def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:

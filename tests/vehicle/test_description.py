@@ -225,6 +225,15 @@ def test_a_preset_of_ones_own_stands_on_another(tmp_path: Path) -> None:
     assert changed.accelerometer == rtk.accelerometer
 
 
+def test_a_complete_vehicle_takes_another_preset() -> None:
+    """What it has on top of its own preset stays."""
+    own = load_vehicle("iris", ["sensors.gps.satellites=11"])
+    changed = load_vehicle(own, ["sensors.preset=urban"]).sensors
+    urban = load_vehicle("iris", ["sensors.preset=urban"]).sensors
+    assert own.sensors.gps != urban.gps
+    assert changed == urban.model_copy(update={"gps": urban.gps.model_copy(update={"satellites": 11})})
+
+
 def test_a_preset_that_stands_on_itself_is_refused(tmp_path: Path) -> None:
     one, two = tmp_path / "one.toml", tmp_path / "two.toml"
     one.write_text(f'preset = "{two}"\n')
