@@ -31,6 +31,8 @@ from controller.law.state import (
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
 
+LARGEST_LEAN = math.radians(30.0)
+"""rad away from the reference's attitude, that errors of places and velocities may ask for."""
 ANTI_WINDUP_TIME = 1.0
 """Time constant, s, with which the integral gives way while the rotors are at a limit."""
 
@@ -177,6 +179,7 @@ def design_for(vehicle: Vehicle, rate_hz: float, weights: Weights, entry: int, l
     record["past_gain"][0, :delay] = gain.past
     time_constant = rotor_time_constant(vehicle)
     # A command acts, on average over its period, half a period after the delay; lagging rotors later still.
+    record["largest_lean"] = LARGEST_LEAN if entry == FEEDFORWARD else 0.0
     record["lead_time"], record["rotor_lag"] = (delay + 0.5) * period, time_constant
     if time_constant > 0.0:
         record["lag_gain"] = gain.state[:, lag]

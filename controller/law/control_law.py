@@ -20,10 +20,19 @@ from numpy.typing import NDArray
 from controller.law.adaptation import ADAPTATION, adapted
 from controller.law.flatness import BODY, STENCIL, flat_motion
 from controller.law.reference import path_derivatives
-from controller.law.state import LONGEST_DELAY, STATE_SIZE, WRENCH_SIZE, Array
+from controller.law.state import (
+    BODY_RATES,
+    EULER_ANGLES,
+    LONGEST_DELAY,
+    STATE_SIZE,
+    WRENCH_SIZE,
+    Array,
+)
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import ACTUATOR_CONTROLS
 
+FIRST_RATE, FIRST_ANGLE = BODY_RATES.start, EULER_ANGLES.start
+"""Indices of the state."""
 INTEGRATOR, FEEDFORWARD, STATE = 0, 1, 2
 """How the reference enters: through the integrator alone, as a feasible motion, or as x* itself."""
 
@@ -41,6 +50,7 @@ DESIGN = np.dtype(
         ("rotor_lag", "f8"),  # s
         ("lag_decay", "f8"),  # share of the rotors' lag that is left after a period
         ("anti_windup", "f8", (3, WRENCH_SIZE)),
+        ("largest_lean", "f8"),  # rad, that everything but tilt and rates may ask for; 0: no limit
         ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
         ("hover_wrench", "f8", WRENCH_SIZE),
         ("adapts", "i8"),  # 1: it finds out what the description gets wrong
@@ -68,6 +78,7 @@ WORK = np.dtype(
         ("integral", "f8", 3),  # v, m s, in the frame
         ("feedforward", "f8", WRENCH_SIZE),  # u*
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
+        ("held_back", "f8", 2),  # of the moments about x and y, N m: what would lean beyond the limit
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("heading", "f8", 2),  # cosine and sine of the reference's yaw
@@ -220,6 +231,33 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
             for age in range(design.delay):
                 u -= design.past_gain[age, k, j] * memory.past[age, j]
         work.wrench[k] = u
+    work.held_back[0] = work.held_back[1] = 0.0
+    if design.largest_lean > 0.0:
+        _limit_lean(design, work)
+
+
+@kernel
+def _limit_lean(design: Any, work: Any) -> None:
+    """Take out of the moments what asks for a lean beyond the limit: for errors that the gains are not for.
+
+    Places, velocities and the integral ask for a lean, which tilt and rates then follow: a cascade, written
+    as one gain. The model is linear, and metres of the estimate's error would ask for more than 90 degrees.
+    """
+    asked = work.held_back
+    for axis in range(2):
+        k, tilt = 1 + axis, FIRST_ANGLE + axis
+        moment = 0.0
+        for i in range(FIRST_RATE):
+            moment -= design.state_gain[k, i] * work.deviation[i]
+        for i in range(3):
+            moment -= design.integral_gain[k, i] * work.integral[i]
+        asked[axis] = moment / design.state_gain[k, tilt]
+    size = math.sqrt(asked[0] ** 2 + asked[1] ** 2)
+    beyond = max(0.0, 1.0 - design.largest_lean / size) if size > 0.0 else 0.0
+    for axis in range(2):
+        k, tilt = 1 + axis, FIRST_ANGLE + axis
+        asked[axis] *= beyond * design.state_gain[k, tilt]
+        work.wrench[k] -= asked[axis]
 
 
 @kernel
@@ -238,7 +276,10 @@ def remember(design: Any, memory: Any, work: Any) -> None:
         memory.past[0, k] = under_way
     for axis in range(3):
         for k in range(WRENCH_SIZE):
-            work.integral[axis] += design.anti_windup[axis, k] * (work.achieved[k] - work.wrench[k])
+            short = work.achieved[k] - work.wrench[k]
+            if k == 1 or k == 2:
+                short -= work.held_back[k - 1]
+            work.integral[axis] += design.anti_windup[axis, k] * short
     _out_of(work.frame, work.integral)
     for axis in range(3):
         memory.integral[axis] = work.integral[axis]

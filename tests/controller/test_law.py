@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from controller.design.catalogue import design
+from controller.design.catalogue import LARGEST_LEAN, design
 from controller.design.names import DESIGNS
 from controller.design.ramp import planned
 from controller.law.control_law import WORK, Design, engaged_memory, remember, step
@@ -166,6 +166,20 @@ def test_deviations_are_seen_along_the_cable() -> None:
     law(estimate)
     assert math.atan2(math.hypot(*cable[:2]), cable[2]) > math.radians(45.0)
     np.testing.assert_allclose(law.work.deviation[LOAD_POSITION], (0.0, 0.0, -0.01), atol=1e-6)
+
+
+@pytest.mark.parametrize("away", [20.0, 500.0])
+def test_no_error_asks_for_more_than_the_largest_lean(away: float) -> None:
+    """A vehicle that leans so far already gets no moment, however far it is off."""
+    vehicle = load_vehicle("heavy")
+    estimate = hover_at(vehicle, (-away, 0.0, 0.0))
+    moments = []
+    for lean in (LARGEST_LEAN, 0.0):
+        estimate[EULER_ANGLES] = (0.0, lean, 0.0)
+        moments.append(
+            Stepped(design("default", vehicle, 250.0), setpoint(ORIGIN, ORIGIN), np.zeros(3))(estimate)[2]
+        )
+    assert abs(moments[0]) < 1e-6 * moments[1]
 
 
 @pytest.mark.parametrize(("number", "step"), LONG_STEPS)
