@@ -18,14 +18,19 @@ from sitl_bridge.vehicle.files import validated
 GRAVITY = 9.81
 LAGS = (0.0, 0.02, 0.05, 0.1)
 """s, of rotors."""
+WIND = 10.0
+"""m/s, at which drag is 5 to 45 % of the vehicle's weight, and 2 to 20 % of the load's."""
 
 
 def _log_uniform(draw: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(draw.uniform(math.log(low), math.log(high))))
 
 
-def random_vehicle(draw: np.random.Generator, longest_cable: float = 20.0) -> Vehicle:
-    """A vehicle from the ranges above; the same generator state gives the same vehicle."""
+def random_vehicle(draw: np.random.Generator, longest_cable: float = 20.0, drag: bool = False) -> Vehicle:
+    """A vehicle from the ranges above; the same generator state gives the same vehicle.
+
+    drag: with drag of vehicle and load, so that wind matters; the rest of the vehicle is the same.
+    """
     mass = _log_uniform(draw, 0.3, 50.0)
     load = mass * float(draw.uniform(0.05, 1.5))
     rotors = int(draw.choice((4, 6, 8)))
@@ -57,4 +62,10 @@ def random_vehicle(draw: np.random.Generator, longest_cable: float = 20.0) -> Ve
             for index, angle in enumerate(2.0 * math.pi * (k + 0.5) / rotors for k in range(rotors))
         ],
     }
+    if drag:
+        content["airframe"]["drag"] = {
+            "linear": mass * GRAVITY * float(draw.uniform(0.0, 0.2)) / WIND,
+            "quadratic": mass * GRAVITY * float(draw.uniform(0.05, 0.25)) / WIND**2,
+        }
+        content["load"]["drag"] = {"quadratic": load * GRAVITY * float(draw.uniform(0.02, 0.2)) / WIND**2}
     return validated(Vehicle, content, "random")

@@ -77,6 +77,7 @@ class RandomVehicles(Section):
     """Vehicles drawn at random from the ranges of `studies.random_vehicles`, one for each flight."""
 
     longest_cable: float = quantity("m", "of the drawn ones", 20.0, gt=0.5, le=100)
+    drag: bool = quantity("-", "with drag of vehicle and load, so that wind matters", False)
 
 
 DEFAULT_FIGURES = (

@@ -96,7 +96,7 @@ def _fly(study: dict[str, Any], draw: dict[str, Any], out: Path | None) -> Fligh
 def _vehicle(study: dict[str, Any], draw: dict[str, Any]) -> Vehicle | str | None:
     if "random_vehicle" in draw:
         generator = np.random.default_rng(int(draw["random_vehicle"]))
-        return random_vehicle(generator, float(study["random_vehicles"]["longest_cable"]))
+        return random_vehicle(generator, **study["random_vehicles"])
     name = draw.get("vehicle")
     return None if name is None else load_vehicle(str(name)) if str(name).endswith(".toml") else str(name)
 

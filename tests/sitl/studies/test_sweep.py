@@ -169,6 +169,18 @@ def test_sixty_random_vehicles_fly_steps_of_every_length() -> None:
     assert max(row["overshoot_pct"] or 0.0 for row in rows) <= 10.0
 
 
+@pytest.mark.parametrize("number", [10014, 10069, 10032])
+def test_long_cables_fly_on_their_sensors(number: int) -> None:
+    """On 21 to 48 m the estimate's first errors, metres of the load, asked for more than 90 degrees."""
+    full = load_study(STUDIES / "random-vehicles-estimate.toml")
+    study = {**full.model_dump(mode="json"), "duration": 4.0}
+    inputs = {"random_vehicle": number, "seed": number, "design": "default", "feedback": "estimate"}
+    for preset in ("rtk", "consumer"):
+        row = fly_draw(study, {**inputs, "sensors.preset": preset, "plant.air.wind": [4.0, 4.0, 0.0]}, None)
+        assert row["outcome"] in ("settled", "did not settle"), row
+        assert row["largest_tilt_deg"] < 60.0
+
+
 def test_the_command_flies_judges_and_goes_on_where_it_was(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     text = (
