@@ -50,6 +50,9 @@ class Assessor(Protocol):
     def reeled(self, rest_length: float, rate: float) -> None:
         """The winch has made the cable so long (m), and goes on at a rate, m/s."""
 
+    def give_up(self) -> None:
+        """The vehicle fell over: what the sensors show from now on is no flight."""
+
     def assess(self, view: VehicleView) -> list[str]:
         """Write the health of sensors and estimate into the view; what there is to say."""
 
@@ -88,6 +91,9 @@ class ExactAssessor:
 
     def load_released(self) -> None:
         """Truth does not need to know."""
+
+    def give_up(self) -> None:
+        """Truth stays true."""
 
     def hook(self, closed: bool) -> None:
         """Truth does not need to know."""

@@ -20,6 +20,7 @@ class EstimateAssessor:
     def __init__(self, feedback: EstimateFeedback) -> None:
         self._feedback = feedback
         self._watch = HealthWatch(feedback.estimator.vehicle.sensors.tracker is not None)
+        self._given_up = False
 
     def contact(self, estimate: Array) -> Contact:
         """As the filter's models have it: height is not known well enough to go by."""
@@ -48,8 +49,15 @@ class EstimateAssessor:
         """A pull then is that of a load that was dropped."""
         self._feedback.estimator.hook(closed)
 
+    def give_up(self) -> None:
+        """No estimate until the filter aligns anew: blows and a place on its back are not in its models."""
+        self._given_up = self._given_up or self._feedback.estimator.flying
+
     def assess(self, view: VehicleView) -> list[str]:
         """Health and quality into the view; what there is to say."""
+        if self._given_up and self._feedback.estimator.flying:
+            return _without_estimate(view)
+        self._given_up, view.estimated = False, True
         health = self._feedback.estimator.health()
         ready = self._feedback.ready() or self._feedback.estimator.flying
         for name, good in sensors_good(health).items():
@@ -71,3 +79,14 @@ class EstimateAssessor:
             vertical_accuracy=health.height_std if health.aligned else math.nan,
         )
         return self._watch.changes(health) if health.aligned else []
+
+
+def _without_estimate(view: VehicleView) -> list[str]:
+    """Into the view that there is no estimate any more; what there is to say."""
+    view.health.attitude = view.health.position = view.health.load = False
+    nothing, ratios = math.nan, (math.nan,) * 4
+    view.quality = EstimateQuality(False, False, False, *ratios, nothing, nothing)
+    if not view.estimated:
+        return []
+    view.estimated = False
+    return ["Fallen over: no estimate, position is the GPS receiver's"]

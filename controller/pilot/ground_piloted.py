@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import common
 from controller.design.catalogue import EVEN, Emphasis, guided_designs
 from controller.feedback.assessment import Assessor, Contact, ExactAssessor
 from controller.ground.commands.result import INFO, WARNING, Notice
+from controller.ground.flight.limits.preconditions import tilt
 from controller.ground.flight.motion.setpoint_types import (
     Attitude,
     Body,
@@ -238,9 +239,25 @@ class GuidedAutopilot:
             view.gps = self._receiver.look(view.time)
             for text in self._assessor.assess(view):
                 self.station.announce(Notice(WARNING, text), now)
+        if not view.estimated:
+            self._place_by_receiver(view)
+        elif not self._turning and tilt(view) > math.radians(self.station.parameters["FD_FAIL_TILT"]):
+            self._assessor.give_up()
         view.hil_age = 0.0
         view.throttle = float(self._controls[: len(self._vehicle.rotors)].mean()) if self.armed else 0.0
         return view, contact, first
+
+    @property
+    def _turning(self) -> bool:
+        """Whether the rotors are to turn."""
+        return self.armed and not self.station.machine.terminated
+
+    def _place_by_receiver(self, view: VehicleView) -> None:
+        """Vehicle and load are where the last fix was: there is one, or the filter would not have aligned."""
+        if view.gps.position is not None:
+            view.position = view.load_position = self.station.profile.origin.local(view.gps.position)
+        known = all(map(math.isfinite, view.gps.velocity))
+        view.velocity = view.load_velocity = view.gps.velocity if known else (0.0, 0.0, 0.0)
 
     def _follow_winch(self) -> None:
         """Law and clearances follow the cable's rest length; gains are designed anew from a tenth on.

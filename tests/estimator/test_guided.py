@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import common
 from scipy.stats import chi2
 
 from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, PARTS, X_LOAD, Array
 from controller.ground.flight.modes import Reposition
 from controller.ground.flight.px4_modes import Mode
+from controller.ground.telemetry.messages import build
+from sitl_bridge.plant.physics.state import BODY_RATES
 from sitl_bridge.plant.sensors.instruments import LOST, WORKS
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import RATE_HZ, GuidedFlight
@@ -176,3 +179,38 @@ def test_hold_outlives_what_the_model_can_bridge(faults: dict[str, Any], said: s
     later = [state[:3] for now, state, _ in flight.rows if now > FAULT_AT + 2.0]
     assert np.linalg.norm(np.array(later) - place, axis=1).max() < 1.5
     assert np.abs(flight.errors()[-1]).max() < 0.6
+
+
+def test_a_vehicle_that_fell_over_has_no_estimate() -> None:
+    """Its place is then that of GPS; the filter's own height was wrong by hundreds of metres."""
+    flight = iris()
+    flight.arm_and_take_off(5.0)
+    assert flight.machine.terminate().ok
+    flight.simulation.world.state[BODY_RATES] = (7.0, 1.0, 0.0)
+    flight.wait(12.0)
+    assert flight.said.count("Fallen over: no estimate, position is the GPS receiver's") == 1
+    view = flight.machine.view
+    assert view is not None
+    vehicle, _ = flight.truth()
+    assert np.linalg.norm(np.subtract(view.position, vehicle)) < 5.0
+    place, local, status, state = (
+        build(number, flight.machine)
+        for number in (
+            common.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+            common.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+            common.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+            common.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        )
+    )
+    assert abs(place.relative_alt) < 5_000
+    assert abs(local.z) < 5.0
+    assert status.flags == 0
+    assert state.landed_state == common.MAV_LANDED_STATE_UNDEFINED
+    assert build(common.MAVLINK_MSG_ID_HEARTBEAT, flight.machine).system_status == (
+        common.MAV_STATE_FLIGHT_TERMINATION
+    )
+    healthy = build(common.MAVLINK_MSG_ID_SYS_STATUS, flight.machine).onboard_control_sensors_health
+    assert not healthy & common.MAV_SYS_STATUS_AHRS
+    assert flight.machine.disarm(force=True).ok
+    flight.wait(1.0)
+    assert flight.machine.arming_faults() == ["the vehicle fell over; restart the plant"]

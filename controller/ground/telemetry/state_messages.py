@@ -94,6 +94,8 @@ def sys_status(machine: Machine, view: VehicleView) -> Any:
 
 def landed_state(machine: Machine, view: VehicleView) -> int:
     """MAV_LANDED_STATE."""
+    if not view.estimated:
+        return int(mavlink.MAV_LANDED_STATE_UNDEFINED)
     if machine.armed and machine.stage is Stage.ASCENT:
         return int(mavlink.MAV_LANDED_STATE_TAKEOFF)
     if machine.armed and machine.stage is Stage.DESCENT:

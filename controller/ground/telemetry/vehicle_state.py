@@ -156,6 +156,8 @@ class VehicleView:
     gps: Gps = field(default_factory=Gps)
     quality: EstimateQuality | None = None
     """None: the feedback is the truth"""
+    estimated: bool = True
+    """False: the vehicle fell over, and there is no estimate of it; its place is that of the last fix"""
 
     @property
     def in_reach(self) -> bool:

@@ -22,6 +22,8 @@ def arming_faults(view: VehicleView | None, parameters: Parameters, fence: Fence
     """Why the vehicle cannot be armed now; empty if it can."""
     if view is None or math.isinf(view.hil_age):
         return ["no sensor data yet; start the plant"]
+    if not view.estimated:
+        return ["the vehicle fell over; restart the plant"]
     faults = []
     if view.hil_age > STALE:
         faults.append(f"no sensor data for {view.hil_age:.1f} s; is the plant running?")
