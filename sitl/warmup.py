@@ -19,8 +19,8 @@ FIRST = ("sitl_bridge.plant.run", "controller.run")
 _BAR = 20
 
 
-def warm_up() -> None:
-    """Compile what is missing, and tell how far it is on standard error.
+def warm_up() -> int:
+    """Compile what is missing, and tell how far it is on standard error; returns the number of modules.
 
     Raises RuntimeError if something cannot be compiled, after the rest.
     """
@@ -28,7 +28,9 @@ def warm_up() -> None:
     wanted = missing(modules())
     progress = Progress(sys.stderr.isatty())
     compile_missing(wanted, progress.say)
-    progress.end(len(wanted), time.monotonic() - began)
+    if wanted:
+        progress.end(len(wanted), time.monotonic() - began)
+    return len(wanted)
 
 
 def modules() -> list[str]:
@@ -67,5 +69,5 @@ class Progress:
 
     def end(self, total: int, seconds: float) -> None:
         """Tell that all are compiled."""
-        text = f"compiled {total} modules in {seconds:.0f} s" if total else "nothing to compile"
+        text = f"compiled {total} modules in {seconds:.0f} s"
         print(f"\r\x1b[K{text}" if self._terminal else text, file=sys.stderr, flush=True)

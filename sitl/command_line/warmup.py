@@ -25,8 +25,10 @@ def run_warmup(_: argparse.Namespace) -> int:
     from sitl.warmup import warm_up
 
     try:
-        warm_up()
+        compiled = warm_up()
     except RuntimeError as error:
         print(f"sitl warmup: {error}", file=sys.stderr)
         return FAILED
+    if not compiled:
+        print("nothing to compile", file=sys.stderr)
     return 0
