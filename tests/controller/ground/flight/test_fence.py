@@ -193,8 +193,11 @@ def test_ways_along_a_side_and_past_it(
     assert crosses(SQUARE, end, start) == expected
 
 
-def test_a_way_of_no_length_beside_a_circle() -> None:
+def test_ways_that_end_before_a_circle_or_touch_it() -> None:
     circle = Zone(False, ((4.0, 5.0),), 3.0)
+    for start, end in (((-10.0, 5.0), (0.5, 5.0)), ((4.0, -9.0), (4.0, 1.5))):
+        assert not crosses(circle, start, end)
+        assert not crosses(circle, end, start)
     assert not crosses(circle, (8.0, 5.0), (8.0, 5.0))
     assert crosses(circle, (1.0, 5.0), (1.0, 5.0))  # on its edge
     assert crosses(circle, (7.0, 0.0), (7.0, 10.0))  # touches it
