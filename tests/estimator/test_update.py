@@ -146,8 +146,8 @@ def test_a_remembered_quantity_is_measured() -> None:
         np.testing.assert_allclose(correction_of(f), correction, atol=1e-9)
 
 
-def test_joseph_keeps_the_covariance_positive_where_the_short_form_does_not() -> None:
-    """A first scalar a billion times sharper than what was known, then the same one again."""
+def test_a_very_sharp_scalar_taken_in_twice_leaves_the_covariance_positive() -> None:
+    """To rounding: it is sharper than what was known by fifteen orders of magnitude."""
     f = record()
     f.P *= 1e6
     for _ in range(2):
