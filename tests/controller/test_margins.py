@@ -13,6 +13,7 @@ from controller.design.names import DESIGNS
 from controller.law.control_law import WORK, Design, engaged_memory, remember, step
 from controller.law.reference import setpoint
 from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
+from sitl.studies.random_vehicles import random_vehicle
 from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.fleet import FLEET, attributes, delayed
 
@@ -106,6 +107,14 @@ def test_the_default_design_bears_20_ms_at_each_input(vehicle: Vehicle, rate_hz:
     assert spectral_radius(closed_loop_matrix(model, record)) < 1.0
     for inputs in (*((i,) for i in EVERY_INPUT), EVERY_INPUT):
         assert delay_margin(model, record, inputs, longest=0.02) == 0.02, inputs
+
+
+@pytest.mark.parametrize("number", range(20))
+def test_so_it_does_with_random_vehicles(number: int) -> None:
+    vehicle = random_vehicle(np.random.default_rng(1_000_003 + number), 50.0)
+    model, record = actuated_model(vehicle), design("default", vehicle, 250.0)
+    for inputs in (*((i,) for i in EVERY_INPUT), EVERY_INPUT):
+        assert spectral_radius(closed_loop_matrix(model, record, 0.02, inputs)) < 1.0, inputs
 
 
 @pytest.mark.parametrize("name", DESIGNS)
