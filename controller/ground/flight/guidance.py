@@ -41,6 +41,8 @@ from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
 
 _LIFTING = 0.5
 """Share of the hover thrust below which a vehicle on the ground stays there"""
+_TOUCH_DOWN = 3.0
+"""s after the winch has stood still, in which a load may be found to lie that it has lowered"""
 _NEAR = 1.0
 """m, within which a vehicle hovers where it is to hover"""
 
@@ -110,6 +112,10 @@ class Guidance:
         self.followed = FollowTarget()
         self._set_down = False
         """The winch has lowered the load to the ground"""
+        self._pays_out = False
+        """The winch has paid out since the last look"""
+        self._paid_out_at = -math.inf
+        """s of the plant's time, of the last look at which it had"""
         self._destination: tuple[Triple, float, float] | None = None
         """Of a reposition that waits for the end of a take-off: vehicle (m), yaw (rad), speed (m/s)"""
 
@@ -262,7 +268,10 @@ class Guidance:
 
     def _note_set_down(self, view: VehicleView) -> None:
         """A load that the winch lowers to the ground, or lifts from it: the vehicle holds where it hovers."""
-        lies = view.load_attached and view.load_on_ground
+        if self._pays_out:
+            self._pays_out, self._paid_out_at = False, view.time
+        lowered = view.time - self._paid_out_at < _TOUCH_DOWN
+        lies = view.load_attached and view.load_on_ground and (lowered or self._set_down)
         lifted = view.load_attached and view.cable_taut and not view.load_on_ground
         if self._profile.winch is None or not (lifted if self._set_down else lies):
             self._set_down = self._set_down and view.load_attached
@@ -340,6 +349,7 @@ class Guidance:
 
     def lengthened(self, change: float) -> None:
         """The cable is longer by so much, m: the vehicle stays where it holds, and the load goes down."""
+        self._pays_out = self._pays_out or change > 0.0
         if self._point_of is Body.LOAD:
             x, y, z = self._point
             self._point = (x, y, z - change)
