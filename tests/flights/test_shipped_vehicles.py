@@ -1,4 +1,4 @@
-"""The `default` design on every shipped vehicle, rotors' lag included: margin, and a step over the link."""
+"""The `default` design on every shipped vehicle, rotors' lag included: margin, and a step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_at_least_20_ms_of_delay_margin(name: str) -> None:
 
 
 @every_vehicle
-def test_a_step_over_the_link_settles_without_saturating(name: str, fly: Fly, tmp_path: Path) -> None:
+def test_a_step_settles_without_saturating(name: str, fly: Fly, tmp_path: Path) -> None:
     vehicle = load_vehicle(name)
     x, y, z = vehicle.initial.load_position
     file = tmp_path / "step.toml"

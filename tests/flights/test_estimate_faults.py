@@ -1,4 +1,4 @@
-"""What a flight on the estimate survives, each a shipped scenario over the link: `iris`, 20 m up."""
+"""What a flight on the estimate survives, each a shipped scenario: `iris`, 20 m up."""
 
 from __future__ import annotations
 
