@@ -3,20 +3,42 @@
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-# No deadline: a busy machine is no fault. The same examples each time: a failure is never the weather's;
-# `--hypothesis-profile=search` looks for new ones.
-settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
-settings.register_profile("search", deadline=None, max_examples=1000)
+# No deadline, and no complaint of slow data: a busy machine is no fault. The same examples each time: a
+# failure is never the weather's; `--hypothesis-profile=search` looks for new ones.
+SLOW = [HealthCheck.too_slow]
+settings.register_profile(
+    "repeatable", deadline=None, derandomize=True, max_examples=50, suppress_health_check=SLOW
+)
+settings.register_profile("search", deadline=None, max_examples=1000, suppress_health_check=SLOW)
 settings.load_profile("repeatable")
 
 STATIONS = "tests/loopback/stations/"
+LONG = (
+    STATIONS,
+    "tests/sitl/test_paper.py",
+    "tests/sitl/studies/",
+    "tests/sitl/test_in_process.py",
+    "tests/loopback/",
+    "tests/flights/",
+    "tests/ground/",
+    "tests/estimator/",
+    "tests/over/",
+    "tests/docs/",
+)
+"""What takes tens of seconds and more, begun first: at the end no worker waits for another's long one."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long ones first, else in order."""
+    last = len(LONG)
+    items.sort(key=lambda item: next((i for i, at in enumerate(LONG) if item.nodeid.startswith(at)), last))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With several workers (`-n 2`) one flies with ground stations, which mostly wait; the others compute.
+    """With three workers on two cores one flies with ground stations and mostly waits; two compute.
 
     No two flights with stations are ever under way together, and what a module has set up is set up once.
     """
@@ -26,4 +48,5 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
         def _split_scope(self, nodeid: str) -> str:
             return STATIONS if nodeid.startswith(STATIONS) else nodeid.split("::")[0]
 
+    config.option.loadscopereorder = False  # by the number of tests; ours are in order
     return ByFolder(config, log)
