@@ -22,7 +22,7 @@ KEYS = {
 
 
 def test_setpoint_in_lockstep_and_what_it_leaves(fly: Fly) -> None:
-    summary = fly("setpoint")
+    summary = fly("setpoint", "--logs", "all")
     assert summary.keys() >= KEYS
     assert summary["settled"]
     assert summary["settling_time_2pct_s"] <= 6.0
@@ -37,12 +37,15 @@ def test_setpoint_in_lockstep_and_what_it_leaves(fly: Fly) -> None:
     assert picture.startswith(b"\x89PNG")
     tlog = mavutil.mavlink_connection(summary["tlog"])
     counts: dict[str, int] = {}
+    fixes = 0
     while (message := tlog.recv_match()) is not None:
         counts[message.get_type()] = counts.get(message.get_type(), 0) + 1
+        # Before the first answer the world freewheels, the longer the busier the machine.
+        fixes += message.get_type() == "HIL_GPS" and "HIL_ACTUATOR_CONTROLS" in counts
     assert counts["HIL_ACTUATOR_CONTROLS"] >= 30 * 250
     assert counts["HIL_SENSOR"] >= 30 * 250
     assert counts["ODOMETRY"] >= 2 * 30 * 250
-    assert counts["HIL_GPS"] == pytest.approx(300, abs=20)
+    assert fixes == pytest.approx(300, abs=20)
     assert "BAD_DATA" not in counts
 
 
