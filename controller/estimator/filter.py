@@ -208,6 +208,10 @@ class Estimator:
         """
         if rotor_speed is not None:
             self.memory["rotor_speed"][: len(rotor_speed)] = rotor_speed
+            # A delayed loop goes on giving them until the first command arrives.
+            commands = self.memory["commands"]
+            commands[:, : len(rotor_speed)] = rotor_speed
+            self.memory["command_count"] += len(commands)
         self._change(FLYING, int(self.memory["load_mode"]))
 
     def hide_offset(self, offset: Array) -> None:
