@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controller.design.ramp import LARGEST_THRUST, STEEPEST, Demand, demand_of_circle, planned
+from controller.design.motion.ramp import LARGEST_THRUST, STEEPEST, Demand, demand_of_circle, planned
 from controller.law.reference import Path
 from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 from sitl_bridge.vehicle.rotors import Rotor, full_thrust, rotor_effect

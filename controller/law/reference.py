@@ -3,7 +3,7 @@
 A path is one flat record, so that compiled code evaluates it at every tick. `raw` gives the position that
 the paper feeds to its integrator, steps and all; `feasible` leaves the start smoothly, so that a feed-forward
 can follow it exactly. How it leaves is a smooth step, or a profile that was planned for the vehicle
-(`design.ramp`). A path can also be given moment by moment (`local_path`), by somebody who shapes it as the
+(`design.motion`). A path can also be given moment by moment (`local_path`), by somebody who shapes it as the
 flight goes on.
 """
 

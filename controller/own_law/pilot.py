@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.design.ramp import smoothly_planned
+from controller.design.motion.ramp import smoothly_planned
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation

@@ -35,7 +35,9 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
-        from controller.design.prepared import PreparedMotion  # scipy's optimizer: nothing else takes it
+        from controller.design.motion.prepared import (
+            PreparedMotion,  # scipy's optimizer: nothing else takes it
+        )
 
         expected = path_from(vehicle.initial_load_position)
         self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from controller.design.feasibility import vehicle_faults
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from sitl.api import fly
 from sitl.flights.refusals import check_feasible
 from sitl.flights.scenario import Hover, Scenario, Setpoint, scenario_vehicle

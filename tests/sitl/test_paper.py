@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.studies.paper import elasticity, linear, motions, page, riccati, sampling
 from sitl.studies.paper import independent_simulation as second
-from sitl.studies.paper.position import vehicle_with
+from sitl.studies.paper import page, riccati
 from sitl.studies.paper.record import (
     CORRECTED,
     NOT_JUDGED,
@@ -27,6 +26,8 @@ from sitl.studies.paper.record import (
     Ledger,
 )
 from sitl.studies.paper.run import run
+from sitl.studies.paper.sections import elasticity, linear, motions, sampling
+from sitl.studies.paper.sections.position import vehicle_with
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import load_vehicle
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from controller.design.ramp import smoothly_planned
+from controller.design.motion.ramp import smoothly_planned
 from controller.law.reference import setpoint
 from controller.law.state import (
     EULER_ANGLES,

@@ -11,7 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sitl.flights.launch import FlightError
-from sitl.studies.paper import (
+from sitl.studies.paper import page
+from sitl.studies.paper.context import Context
+from sitl.studies.paper.flights import Pilot
+from sitl.studies.paper.record import Ledger
+from sitl.studies.paper.sections import (
     circling,
     elasticity,
     hover,
@@ -19,14 +23,10 @@ from sitl.studies.paper import (
     lqr_hover,
     model,
     motions,
-    page,
     position,
     rigid,
     sampling,
 )
-from sitl.studies.paper.context import Context
-from sitl.studies.paper.flights import Pilot
-from sitl.studies.paper.record import Ledger
 from sitl_bridge.process import StopRequest
 
 PAGE_NAME = "index.html"

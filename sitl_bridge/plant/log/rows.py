@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl_bridge.compiled import Buffer, entry_point
-from sitl_bridge.plant.physics.cable import span, tension_of
-from sitl_bridge.plant.physics.chain import NODE_STATES
-from sitl_bridge.plant.physics.flexible_cable import CHAIN
+from sitl_bridge.plant.physics.cables.cable import span, tension_of
+from sitl_bridge.plant.physics.cables.chain import NODE_STATES
+from sitl_bridge.plant.physics.cables.flexible_cable import CHAIN
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.state import (
     CABLE_STATE,

@@ -17,7 +17,7 @@ import numpy as np
 
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 from sitl_bridge.plant.physics.air import drag_force
-from sitl_bridge.plant.physics.cable import (
+from sitl_bridge.plant.physics.cables.cable import (
     break_overloaded,
     goes_slack,
     is_taut,
@@ -25,9 +25,14 @@ from sitl_bridge.plant.physics.cable import (
     taut_margin_of,
     tension_of,
 )
-from sitl_bridge.plant.physics.flexible_cable import LINEAR, flexible_cable
+from sitl_bridge.plant.physics.cables.flexible_cable import LINEAR, flexible_cable
+from sitl_bridge.plant.physics.cables.hoist import (
+    begin_reeling,
+    end_reeling,
+    take_hoist_commands,
+    work_gripper,
+)
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle, move_anchors
-from sitl_bridge.plant.physics.hoist import begin_reeling, end_reeling, take_hoist_commands, work_gripper
 from sitl_bridge.plant.physics.parameters import PARAMETERS
 from sitl_bridge.plant.physics.rotors import rotor_decay, rotor_wrench, spin_up
 from sitl_bridge.plant.physics.state import (

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl_bridge.plant.physics.chain import NODE_STATES
-from sitl_bridge.plant.physics.flexible_cable import CHAIN, LINEAR, PROGRESSIVE
+from sitl_bridge.plant.physics.cables.chain import NODE_STATES
+from sitl_bridge.plant.physics.cables.flexible_cable import CHAIN, LINEAR, PROGRESSIVE
+from sitl_bridge.plant.physics.cables.hoist import HOIST, hoist
 from sitl_bridge.plant.physics.ground import contact, leg_reach
-from sitl_bridge.plant.physics.hoist import HOIST, hoist
 from sitl_bridge.plant.physics.state import LEG_BLOCKS, LEG_LANES, MOST_ROTORS
 from sitl_bridge.vehicle.cable_law import BRANCH_SPEEDS, BRANCHES, bounce_rate, branches, cable_law
 from sitl_bridge.vehicle.chain import chain_rate, end_mass, segment_drag

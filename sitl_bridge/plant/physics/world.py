@@ -17,11 +17,11 @@ from sitl_bridge.plant.physics.battery import (
     power_coefficients,
     reading,
 )
-from sitl_bridge.plant.physics.cable import tension_of
-from sitl_bridge.plant.physics.chain import NODE_STATES
+from sitl_bridge.plant.physics.cables.cable import tension_of
+from sitl_bridge.plant.physics.cables.chain import NODE_STATES
+from sitl_bridge.plant.physics.cables.hoist import Reel, hoist
 from sitl_bridge.plant.physics.disturbance import HeldForce, HeldWind
 from sitl_bridge.plant.physics.dynamics import advance, set_rotors
-from sitl_bridge.plant.physics.hoist import Reel, hoist
 from sitl_bridge.plant.physics.parameters import parameters, step_count
 from sitl_bridge.plant.physics.record import WORLD
 from sitl_bridge.plant.physics.state import (

@@ -29,7 +29,7 @@ from sitl_bridge.mavlink.fields import NOT_KNOWN_INT16, NOT_KNOWN_UINT16, pack_v
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.mavlink.hil import FRAME_BODY_FRD
 from sitl_bridge.plant.physics.battery import BatteryReading
-from sitl_bridge.plant.physics.hoist import Reel
+from sitl_bridge.plant.physics.cables.hoist import Reel
 from sitl_bridge.plant.physics.state import LOAD_POSITION, LOAD_VELOCITY, Array
 from sitl_bridge.plant.sensors.tracker import Sighting
 from sitl_bridge.vehicle.description import Battery, Winch

@@ -13,7 +13,7 @@ from controller.law.allocation import MOST_ROTORS, allocate, allocation
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.fleet import attributes
-from tests.controller.test_allocation import layout, regular, rotor
+from tests.controller.law.test_allocation import layout, regular, rotor
 
 UNEQUAL = layout(
     [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from controller.law import control_law, control_step
 from controller.law.allocation import allocation
 from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, STATE, WORK, engaged_memory

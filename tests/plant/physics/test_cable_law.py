@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl_bridge.plant.physics import cable
-from sitl_bridge.plant.physics.flexible_cable import CHAIN, LINEAR, PROGRESSIVE
+from sitl_bridge.plant.physics.cables import cable
+from sitl_bridge.plant.physics.cables.flexible_cable import CHAIN, LINEAR, PROGRESSIVE
 from sitl_bridge.plant.physics.state import CABLE_HOLDS, CABLE_STATE, INNER_SIZE, STATE_SIZE, Array
 
 DIRECTION = np.array([2.0, -3.0, 6.0]) / 7.0

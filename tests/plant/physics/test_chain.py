@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, fsolve
 
-from sitl_bridge.plant.physics.chain import NODE_STATES, chain
+from sitl_bridge.plant.physics.cables.chain import NODE_STATES, chain
 from sitl_bridge.plant.physics.parameters import LONGEST_STEP, parameters, step_count
 from sitl_bridge.plant.physics.state import (
     CABLE_HOLDS,

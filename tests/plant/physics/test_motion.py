@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sitl_bridge.plant.physics import dynamics
-from sitl_bridge.plant.physics.cable import stretch, taut_force, tension_of
-from sitl_bridge.plant.physics.flexible_cable import flexible_cable
+from sitl_bridge.plant.physics.cables.cable import stretch, taut_force, tension_of
+from sitl_bridge.plant.physics.cables.flexible_cable import flexible_cable
 from sitl_bridge.plant.physics.ground import LOOSE, ground_on_load, ground_on_vehicle
 from sitl_bridge.plant.physics.parameters import PARAMETERS, parameters
 from sitl_bridge.plant.physics.rotors import rotor_wrench

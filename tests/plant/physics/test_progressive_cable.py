@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import root_scalar
 
-from sitl_bridge.plant.physics.flexible_cable import progressive_tension, strain_without_tension
+from sitl_bridge.plant.physics.cables.flexible_cable import progressive_tension, strain_without_tension
 from sitl_bridge.plant.physics.parameters import parameters
 from sitl_bridge.plant.physics.state import (
     CABLE_HOLDS,

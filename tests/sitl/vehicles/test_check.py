@@ -8,9 +8,9 @@ import math
 import pytest
 
 from controller.design.catalogue import design
-from controller.design.limits import limits_of
 from controller.design.margins import closed_loop_matrix, spectral_radius
 from controller.design.model import actuated_model
+from controller.design.motion.limits import limits_of
 from sitl.command_line.commands import main
 from sitl.vehicles.check import fly_step
 from sitl.vehicles.figures import figures, modes

@@ -12,9 +12,9 @@ from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Flight, Request
-from sitl.studies.paper.linear import gains, hover_point
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, REPRODUCED
+from sitl.studies.paper.sections.linear import gains, hover_point
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
 

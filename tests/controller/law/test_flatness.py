@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from controller.law.allocation import allocation
 from controller.law.flatness import STENCIL, body, flat_motion
 from controller.law.reference import Path, circle, feasible, setpoint

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import BSpline, PPoly
 from scipy.optimize import linprog
 
-from controller.design.straight_line import ORDERS, StraightLine
+from controller.design.motion.straight_line import ORDERS, StraightLine
 from controller.law.reference import MOST_PIECES, PIECE_ORDER, SMOOTH_STEP
 from controller.law.state import Array
 

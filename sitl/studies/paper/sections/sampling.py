@@ -20,10 +20,10 @@ from controller.law.reference import setpoint
 from sitl.flights.metrics import settling_time
 from sitl.studies.paper import offline, page, plots
 from sitl.studies.paper.context import Context
-from sitl.studies.paper.linear import gains
 from sitl.studies.paper.page import Cell
-from sitl.studies.paper.position import TARGET, vehicle_with
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED
+from sitl.studies.paper.sections.linear import gains
+from sitl.studies.paper.sections.position import TARGET, vehicle_with
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]

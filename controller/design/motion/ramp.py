@@ -2,7 +2,7 @@
 
 The load's position is a flat output (`law.flatness`): the vehicle's way, tilt and thrust follow from it. On a
 long cable the vehicle's acceleration is the load's plus l/g times its snap, so a short step may ask for more
-than a long one. To a set-point the load goes on a straight line in the shortest time (`design.fastest`); onto
+than a long one. To a set-point the load goes on a straight line in the shortest time (`fastest`); onto
 a circle it goes with the shortest smooth step whose motion stays within the limits.
 """
 
@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import PPoly
 
-from controller.design.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
-from controller.design.fastest import fastest
-from controller.design.limits import Limits, limits_of
+from controller.design.motion.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
+from controller.design.motion.fastest import fastest
+from controller.design.motion.limits import Limits, limits_of
+from controller.design.motion.slower import slower
+from controller.design.motion.straight_line import StraightLine, drag_force
 from controller.design.remembered import remembered
-from controller.design.slower import slower
-from controller.design.straight_line import StraightLine, drag_force
 from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised

@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import Any
 
 from sitl_bridge.compiled import kernel
-from sitl_bridge.plant.physics.chain import chain_tension
-from sitl_bridge.plant.physics.flexible_cable import CHAIN, LINEAR, PROGRESSIVE, progressive_tension
+from sitl_bridge.plant.physics.cables.chain import chain_tension
+from sitl_bridge.plant.physics.cables.flexible_cable import CHAIN, LINEAR, PROGRESSIVE, progressive_tension
 from sitl_bridge.plant.physics.state import CABLE_HOLDS, CABLE_STATE, Array
 
 

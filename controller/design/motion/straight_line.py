@@ -12,8 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from controller.design.cable_length import lagging
-from controller.design.limits import Limits
+from controller.design.motion.cable_length import lagging
+from controller.design.motion.limits import Limits
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Drag, Vehicle
 from sitl_bridge.vehicle.rotors import rotor_effect

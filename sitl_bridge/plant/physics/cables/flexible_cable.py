@@ -13,7 +13,7 @@ import math
 from typing import Any
 
 from sitl_bridge.compiled import kernel
-from sitl_bridge.plant.physics.chain import chain
+from sitl_bridge.plant.physics.cables.chain import chain
 from sitl_bridge.plant.physics.state import STATE_SIZE, Array
 from sitl_bridge.vehicle.cable_law import BRANCHES
 

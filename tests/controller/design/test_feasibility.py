@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from controller.design.catalogue import design
 from controller.design.feasibility import LEAST_THRUST, path_faults, vehicle_faults
-from controller.design.ramp import demand_of_circle, planned
+from controller.design.motion.ramp import demand_of_circle, planned
 from controller.law.reference import circle, setpoint
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle

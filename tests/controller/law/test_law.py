@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from controller.design.catalogue import LARGEST_LEAN, design
+from controller.design.motion.ramp import planned
 from controller.design.names import DESIGNS
-from controller.design.ramp import planned
 from controller.law.control_law import WORK, Design, engaged_memory, remember, step
 from controller.law.reference import Path, circle, setpoint
 from controller.law.state import EULER_ANGLES, LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array

@@ -18,11 +18,11 @@ from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import offline, page, plots, riccati
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Request
-from sitl.studies.paper.linear import damping_ratio, gains, hover_point, open_loop_modes
 from sitl.studies.paper.page import Cell
-from sitl.studies.paper.position import TARGET, law
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
-from sitl.studies.paper.sampling import held, spectral_radius
+from sitl.studies.paper.sections.linear import damping_ratio, gains, hover_point, open_loop_modes
+from sitl.studies.paper.sections.position import TARGET, law
+from sitl.studies.paper.sections.sampling import held, spectral_radius
 from sitl.studies.sweep.draws import draws
 from sitl.studies.sweep.study import Study, Vary
 from sitl.studies.sweep.worker import drawn

@@ -7,7 +7,7 @@ import pytest
 
 import sitl
 from controller.design.catalogue import design
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from controller.law.adaptation import LEAST, MOST
 from controller.law.allocation import MOST_ROTORS, allocation
 from controller.law.control_law import WORK, engaged_memory

@@ -11,10 +11,10 @@ from scipy.interpolate import BSpline
 from scipy.optimize import minimize
 
 from controller.design.catalogue import design
-from controller.design.fastest import fastest
-from controller.design.limits import limits_of
-from controller.design.ramp import demand, planned
-from controller.design.straight_line import StraightLine
+from controller.design.motion.fastest import fastest
+from controller.design.motion.limits import limits_of
+from controller.design.motion.ramp import demand, planned
+from controller.design.motion.straight_line import StraightLine
 from controller.law.reference import DERIVATIVES, Path, feasible, setpoint
 from controller.law.state import Array
 from sitl.studies.random_vehicles import random_vehicle

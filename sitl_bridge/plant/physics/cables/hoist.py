@@ -21,7 +21,7 @@ import numpy as np
 
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import CLUTCH_CONTROL, GRIPPER_CONTROL, WINCH_CONTROL
-from sitl_bridge.plant.physics.cable import span, tension_of
+from sitl_bridge.plant.physics.cables.cable import span, tension_of
 from sitl_bridge.plant.physics.state import CABLE_HOLDS, Array
 from sitl_bridge.vehicle.description import Vehicle
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.design.limits import Limits
-from controller.design.straight_line import StraightLine
+from controller.design.motion.limits import Limits
+from controller.design.motion.straight_line import StraightLine
 from controller.law.adaptation import FOUND
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Vehicle

@@ -16,11 +16,11 @@ from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import offline, page, plots
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Flight, Request
-from sitl.studies.paper.linear import damping_ratio, gains, hover_point, open_loop_modes
-from sitl.studies.paper.lqr_hover import largest_difference
-from sitl.studies.paper.motions import bounce_mode, driven_oscillation
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
+from sitl.studies.paper.sections.linear import damping_ratio, gains, hover_point, open_loop_modes
+from sitl.studies.paper.sections.lqr_hover import largest_difference
+from sitl.studies.paper.sections.motions import bounce_mode, driven_oscillation
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
 

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller.design.catalogue import design
-from controller.design.limits import limits_of
-from controller.design.ramp import demand, planned
+from controller.design.motion.limits import limits_of
+from controller.design.motion.ramp import demand, planned
 from controller.law.flatness import STENCIL, body, flat_motion
 from controller.law.reference import circle, setpoint
 from controller.law.state import EULER_ANGLES, STATE_SIZE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.design.catalogue import design
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from controller.design.remembered import remembered
 from controller.law.reference import setpoint
 from sitl_bridge.vehicle.files import load_vehicle

@@ -3,7 +3,7 @@
 import pytest
 
 from controller.design.catalogue import design
-from controller.design.ramp import planned
+from controller.design.motion.ramp import planned
 from controller.law.reference import circle, setpoint
 from sitl_bridge.vehicle.cable_law import linear_cable, linearised
 from sitl_bridge.vehicle.description import Vehicle

@@ -15,11 +15,11 @@ from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots, riccati
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Flight, Request
-from sitl.studies.paper.linear import gains, hover_point
-from sitl.studies.paper.lqr_hover import largest_difference
 from sitl.studies.paper.page import Cell
-from sitl.studies.paper.position import LENGTHS, around, law
 from sitl.studies.paper.record import UNSUPPORTED, Ledger
+from sitl.studies.paper.sections.linear import gains, hover_point
+from sitl.studies.paper.sections.lqr_hover import largest_difference
+from sitl.studies.paper.sections.position import LENGTHS, around, law
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]

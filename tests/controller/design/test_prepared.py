@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from controller.design import prepared, ramp
-from controller.design.prepared import MORE_THRUST, MORE_TILT, PreparedMotion, adapted
-from controller.design.ramp import Demand, demand, planned
+from controller.design.motion import prepared, ramp
+from controller.design.motion.prepared import MORE_THRUST, MORE_TILT, PreparedMotion, adapted
+from controller.design.motion.ramp import Demand, demand, planned
 from controller.law.reference import Path, circle, setpoint
 from controller.law.state import LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION
 from controller.pilot.autopilot import Autopilot

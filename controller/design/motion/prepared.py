@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.design.ramp import Demand, demand, planned
+from controller.design.motion.ramp import Demand, demand, planned
 from controller.law.reference import Path
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
