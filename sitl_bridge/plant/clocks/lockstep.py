@@ -84,10 +84,10 @@ class Lockstep:
         self._resend = resend
         self._on_silence = on_silence
         self._state = State.START
-        self._due: float  # when the current tick is to be sent (again)
-        self._not_before: float  # with a pace: earliest start of the next tick
-        self._sent_at: float
-        self._first_sent_at: float
+        self._due = 0.0  # when the current tick is to be sent (again)
+        self._not_before = 0.0  # with a pace: earliest start of the next tick
+        self._sent_at = 0.0
+        self._first_sent_at = 0.0
         self._repeats = 0  # of the current tick
         self._timer = RetransmissionTimer()
         self._last_controls: Array | None = None  # kept only to fly on with

@@ -31,8 +31,8 @@ class Realtime:
         """By how much the ticks of the scenario missed their deadlines."""
         self._receiver = HilReceiver(simulation, notices, instance)
         self._notices = notices
-        self._deadline: float  # of the next tick
-        self._tick_began: float  # deadline of the current tick
+        self._deadline = 0.0  # of the next tick
+        self._tick_began = 0.0  # deadline of the current tick
         self._pending: deque[tuple[float, Array]] = deque()  # (when it acts, controls)
         self._last_answer: float | None = None
         self._last_time_usec = 0
