@@ -331,9 +331,11 @@ def _start(vehicle: Vehicle) -> Found:
             "initial.vehicle_position equals initial.load_position: no cable direction",
         )
         return
+    if initial.start == "ground" and vehicle.ground is not None and not vehicle.airframe.legs:
+        return  # `_legs` says so; without them the vehicle has no place on the ground
     length = vehicle.initial_length
     if initial.start == "ground":
-        if vehicle.ground is not None and vehicle.airframe.legs and length > cable.rest_length:
+        if vehicle.ground is not None and length > cable.rest_length:
             yield _fault(
                 "initial.load_position",
                 f"initial: the load lies {length:.4g} m from the vehicle, "
