@@ -116,6 +116,10 @@ class Texts:
         self.heard.clear()
 
 
+TERMINATION_GRACE = 5.0
+"""s, of wall time; then it is killed."""
+
+
 class MavProxy:
     """mavproxy.py as a subprocess that takes commands and whose output is kept."""
 
@@ -156,10 +160,10 @@ class MavProxy:
         )
 
     def stop(self) -> None:
-        """End it."""
+        """End it: it does not always follow SIGTERM, and what it has printed is in the file anyway."""
         self._process.terminate()
         try:
-            self._process.wait(PATIENCE)
+            self._process.wait(TERMINATION_GRACE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
