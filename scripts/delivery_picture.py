@@ -2,7 +2,7 @@
 
 sitl fly hold --sensors rtk --out runs/delivery &
 python examples/delivery.py
-python scripts/delivery_picture.py runs/delivery/state.parquet docs/figures/delivery.png
+python scripts/delivery_picture.py runs/delivery/state.parquet docs/images/delivery.png
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Draw the figures of docs/estimator.md, from flights in one process (its table: `estimator_table.py`).
 
-python scripts/estimator_figures.py --out docs/figures
+python scripts/estimator_figures.py --out docs/images
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def draw(out: Path) -> None:
 def main() -> None:
     """Draw."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("docs/figures"))
+    parser.add_argument("--out", type=Path, default=Path("docs/images"))
     draw(parser.parse_args().out)
 
 

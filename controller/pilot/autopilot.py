@@ -35,9 +35,8 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
-        from controller.design.motion.prepared import (
-            PreparedMotion,  # scipy's optimizer: nothing else takes it
-        )
+        # Here, because it takes scipy's optimizer: nothing else in flight does.
+        from controller.design.motion.prepared import PreparedMotion
 
         expected = path_from(vehicle.initial_load_position)
         self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)
