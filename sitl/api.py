@@ -31,6 +31,7 @@ from sitl.flights.scenario import (
     usual_feedback,
     with_agility,
 )
+from sitl.flights.sensing_error import sensing_error
 from sitl.json_values import plain
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.plant.faults.schedule import checked
@@ -194,7 +195,8 @@ def _summary(
     if len(states["time_s"]) > 1:
         load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
         reference = reference_positions(path, states["time_s"])
-        summary |= flight_metrics(states["time_s"], load, reference)
+        seen = sensing_error(told.sensors, facts["feedback"])
+        summary |= flight_metrics(states["time_s"], load, reference, seen)
         summary["settled"] = bool(summary["settled"] and facts["completed"])
         summary |= judge(states, reference, told, summary)._asdict()
     return {key: plain(value) for key, value in summary.items()}

@@ -16,6 +16,8 @@ STEADY_FROM = 20.0
 SETTLED_WINDOW = 5.0
 """A flight has settled when its load was near enough all through its last seconds, so many."""
 SETTLED_SHARE = 0.02
+END_SHARE = 1.0 / 3.0
+"""The end of a flight is as long as the window above, but no more than this share of the flight."""
 SETTLED_DISTANCE = 0.01  # m, the finer of the two settling times
 HOLDING_DISTANCE = 0.3  # m, near enough for a flight without a step
 
@@ -72,22 +74,24 @@ class Metrics(TypedDict):
     tracking_rms_m: float
 
 
-def flight_metrics(times: Array, load: Array, reference: Array) -> Metrics:
+def flight_metrics(times: Array, load: Array, reference: Array, sensing_error_m: float = 0.0) -> Metrics:
     """Metrics of a flight: times (n,) in s, load (n, 3) and reference (n, 3) in m, world.
 
-    A step is a reference that stands still away from where the load begins.
+    A step is a reference that stands still away from where the load begins. sensing_error_m: how far off the
+    sensors may put the load (`sensing_error.sensing_error`); nearer than that no flight is asked to stay.
     """
     errors = np.linalg.norm(load - reference, axis=1)
     stands_still = bool(np.all(reference == reference[0]))
     step = float(errors[0]) if stands_still else 0.0
     is_step = step > SETTLED_DISTANCE
-    tolerance = SETTLED_SHARE * step if is_step else HOLDING_DISTANCE
+    tolerance = max(sensing_error_m, SETTLED_SHARE * step if is_step else HOLDING_DISTANCE)
     end = float(times[-1])
     last = times >= end - SETTLED_WINDOW
+    at_end = times >= end - min(SETTLED_WINDOW, END_SHARE * end)
     return {
         "settled": bool(end >= SETTLED_WINDOW and np.all(errors[last] <= tolerance)),
         "settled_tolerance_m": tolerance,
-        "largest_error_at_end_m": float(errors[last].max()),
+        "largest_error_at_end_m": float(errors[at_end].max()),
         "settling_time_2pct_s": settling_time(times, errors, SETTLED_SHARE * step) if is_step else None,
         "settling_time_1cm_s": settling_time(times, errors, SETTLED_DISTANCE) if stands_still else None,
         "overshoot_pct": overshoot_pct(load, load[0], reference[0]) if stands_still else None,

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.flights.metrics import SETTLED_WINDOW
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
@@ -55,11 +56,16 @@ def judge(
         return Outcome("interrupted" if stopped else "failed", float(states["time_s"][-1]), str(failure))
     if facts.get("settled"):
         return Outcome("settled", facts.get("settling_time_2pct_s"), None)
+    return Outcome("did not settle", None, _why_unsettled(facts))
+
+
+def _why_unsettled(facts: Mapping[str, Any]) -> str | None:
     error, allowed = facts.get("largest_error_at_end_m"), facts.get("settled_tolerance_m")
-    cause = None
-    if error is not None and allowed is not None and error > allowed:
-        cause = f"up to {error:.2f} m off at the end, {allowed:.2f} m allowed"
-    return Outcome("did not settle", None, cause)
+    if error is None or allowed is None:
+        return None
+    if error > allowed:
+        return f"up to {error:.2f} m off at the end, {allowed:.2f} m allowed"
+    return f"within {allowed:.2f} m at the end, but not for the last {SETTLED_WINDOW:g} s"
 
 
 def _lost(states: Mapping[str, Array], reference: Array, vehicle: Vehicle) -> Outcome | None:

@@ -17,6 +17,7 @@ from sitl.export.mcap import FILE_NAME as MCAP_NAME
 from sitl.flights.html_report import FILE_NAME as HTML_NAME
 from sitl.flights.metrics import Metrics, flight_metrics, reference_positions
 from sitl.flights.outcome import judge
+from sitl.flights.sensing_error import sensing_error
 from sitl.json_values import plain
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
@@ -110,7 +111,8 @@ def write_report(
             log = {"time_s": np.zeros(0)}
         if len(log["time_s"]) > 1:
             reference = reference_positions(path, log["time_s"])
-            metrics = flight_metrics(log["time_s"], positions(log, "load"), reference)
+            seen = 0.0 if described is None else sensing_error(described.sensors, facts["feedback"])
+            metrics = flight_metrics(log["time_s"], positions(log, "load"), reference, seen)
             summary |= metrics
             summary["settled"] = bool(summary["settled"] and facts.get("completed"))
             if described is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
+from sitl.flights.metrics import HOLDING_DISTANCE
 from sitl.flights.outcome import FELL
 
 NARROW = 60
@@ -60,7 +61,10 @@ def row(name: str, value: str, width: int) -> str:
 def _outcome(summary: dict[str, Any]) -> str:
     """How it ended, when and why: GPS noise alone can be more than 2 % of a step."""
     if summary["settled"]:
-        return "settled"
+        allowed = summary.get("settled_tolerance_m") or 0.0
+        missed = summary.get("settling_time_2pct_s") is None
+        as_near = missed and allowed > HOLDING_DISTANCE
+        return f"settled within {allowed:.2f} m, as near as its sensors tell" if as_near else "settled"
     outcome = summary.get("outcome")
     text = IN_WORDS.get(str(outcome), str(outcome or "did not settle").upper())
     if outcome in FELL and summary.get("outcome_time_s") is not None:

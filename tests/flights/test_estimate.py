@@ -24,9 +24,10 @@ ON_ESTIMATE = (
 
 def test_setpoint_on_the_estimate(fly: Fly) -> None:
     """The accuracy asked for, for one short flight, with half as much again for a single seed."""
-    # The load stays within 30 cm, not within 2 % of the step: that is the GPS.
-    summary = fly("setpoint", *ON_ESTIMATE, "--duration", "40", "--logs", "all", expect=1)
-    assert summary["completed"]
+    # The load stays as near as the GPS tells, which is not within 2 % of the step.
+    summary = fly("setpoint", *ON_ESTIMATE, "--duration", "40", "--logs", "all")
+    assert summary["outcome"] == "settled"
+    assert summary["settled_tolerance_m"] > 0.02 * 38.0**0.5
     figures = summary["estimate"]
     assert all(
         rms <= 1.5 * limit for rms, limit in zip(figures["load_relative_rms_m"], RELATIVE, strict=True)

@@ -40,7 +40,8 @@ def test_other_rates(fly: Fly, rate: str) -> None:
 
 def test_a_start_on_the_ground_is_judged_from_where_the_load_lies(fly: Fly) -> None:
     """The description puts it 1 m up, the ground wants it lower: a hover there is no step."""
-    summary = fly("hover", "--vehicle", "iris", "--duration", "0.2", expect=1)
+    truth = ("--feedback", "truth")
+    summary = fly("hover", "--vehicle", "iris", "--duration", "0.2", *truth, expect=1)
     assert summary["settling_time_2pct_s"] is None
     assert summary["settled_tolerance_m"] == 0.3
     assert summary["steady_state_error_m"] < 0.05

@@ -77,3 +77,23 @@ def test_reference_of_the_circle_is_the_papers() -> None:
     assert np.abs(positions - expected).max() < 1e-12
     still = reference_positions(setpoint((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)), TIMES)
     assert (still == [1.0, 2.0, 3.0]).all()
+
+
+def test_no_flight_is_asked_to_stay_nearer_than_its_sensors_tell() -> None:
+    load = reference(TARGET).copy()
+    load[0] = 0.0
+    load[-100, 0] += 0.2  # 2 % of the step is 0.123 m
+    for sensing_error_m, settled in ((0.0, False), (0.19, False), (0.21, True)):
+        metrics = flight_metrics(TIMES, load, reference(TARGET), sensing_error_m)
+        assert metrics["settled"] is settled
+    assert metrics["settled_tolerance_m"] == 0.21
+    assert metrics["settling_time_2pct_s"] == pytest.approx(TIMES[-99])
+
+
+def test_the_end_of_a_short_flight_does_not_reach_back_to_its_start() -> None:
+    load = TARGET * (1.0 - np.exp(-2.0 * TIMES))[:, None]
+    short = TIMES <= 5.0
+    metrics = flight_metrics(TIMES[short], load[short], reference(TARGET)[short])
+    assert metrics["largest_error_at_end_m"] == pytest.approx(
+        float(np.linalg.norm(TARGET)) * math.exp(-2.0 * 10.0 / 3.0), rel=0.01
+    )

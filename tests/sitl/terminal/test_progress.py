@@ -74,6 +74,13 @@ def test_a_flight_that_ended_early_has_no_figures_of_its_motion(outcome: str) ->
     assert re.search("settling.*overshoot.*rms", table({"settled": True, **figures}), re.DOTALL)
 
 
+def test_the_table_says_how_near_the_sensors_let_a_load_settle() -> None:
+    near = {"settled": True, "settled_tolerance_m": 0.44, "settling_time_2pct_s": None}
+    assert "settled within 0.44 m" in table(near)
+    assert "within" not in table({**near, "settling_time_2pct_s": 3.0})
+    assert "within" not in table({**near, "settled_tolerance_m": 0.3})
+
+
 def test_the_table_is_as_narrow_as_the_terminal() -> None:
     summary = {"settled": False, "outcome": "did not settle", "outcome_cause": "up to 1.36 m off " * 3}
     assert max(map(len, table(summary, 40).splitlines())) <= 40
