@@ -89,6 +89,7 @@ class Lockstep:
         self._sent_at = 0.0
         self._first_sent_at = 0.0
         self._repeats = 0  # of the current tick
+        self._repeated_usec: int | None = None  # the last tick that was repeated, until a second answer to it
         self._timer = RetransmissionTimer()
         self._last_controls: Array | None = None  # kept only to fly on with
 
@@ -165,6 +166,7 @@ class Lockstep:
         if self._state in (State.START, State.FREEWHEEL):
             self._heard()
         if self._state is State.READY or answer.time_usec != self.simulation.time_usec:
+            self._heard_again(answer.time_usec)
             return  # a duplicate, or an answer that comes too late to matter
         if self._repeats > 0:
             self._notices.over("silence", "autopilot answers again")
@@ -172,6 +174,7 @@ class Lockstep:
             self._last_controls = answer.controls.copy()
         if answer.armed and not self.simulation.started:
             self.simulation.begin()
+            self._timer = RetransmissionTimer()  # what came before was start-up
         self._advance(answer.controls)
         self._answered(now)
 
@@ -206,6 +209,12 @@ class Lockstep:
         if self.simulation.started and self._resend:
             self.resent_ticks += 1
 
+    def _heard_again(self, time_usec: int) -> None:
+        """A second answer to a tick that was repeated: the time-out was too short."""
+        if time_usec == self._repeated_usec:
+            self._repeated_usec = None
+            self._timer.repeated_needlessly()
+
     def _advance(self, controls: Array) -> None:
         if self.simulation.started:
             self.simulation.step(controls)
@@ -216,6 +225,9 @@ class Lockstep:
         """The current tick is over, the next is due."""
         if self._repeats == 0:
             self._timer.sample(now - self._sent_at)
+        else:
+            self._timer.over()
+            self._repeated_usec = self._receiver.time_usec
         self._state, self._repeats = State.READY, 0
         self._due = now
         if self._pace is None:

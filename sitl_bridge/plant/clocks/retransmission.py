@@ -4,8 +4,13 @@ The RFC's own time-out, the smoothed round trip and four variations, is always s
 on, the variation never exceeds twice the smoothed round trip. So it is not kept.
 
 Karn's algorithm: an answer to a repeated tick may belong to any of its sendings, so it is no sample. The
-time-out doubles with each repeat and stays doubled until there is a sample again. Otherwise a round trip that
-has become longer than the time-out would never be measured.
+time-out doubles with each repeat of a tick.
+
+A time-out that is too short shows by a second answer to a repeated tick: the first was under way, the repeat
+needless. The time-out then doubles and stays doubled until there is a sample. Otherwise a round trip that has
+become longer than the time-out would never be measured. A loss shows no second answer, and the next tick has
+the plain time-out again: the RFC keeps it doubled against congestion, which one datagram at a time does not
+cause.
 """
 
 from __future__ import annotations
@@ -20,20 +25,22 @@ _MOST_DOUBLINGS = 16
 
 
 class RetransmissionTimer:
-    """Smoothed round trip, s, and how often the time-out was doubled."""
+    """Smoothed round trip, s, and how often the time-out was doubled: for this tick, and until a sample."""
 
     def __init__(self) -> None:
         self._smoothed: float | None = None
-        self._doublings = 0
+        self._repeats = 0
+        self._needless = 0
 
     def timeout(self) -> float:
         """s to wait for the answer to what is sent now."""
         base = FIRST_TIMEOUT if self._smoothed is None else ROUND_TRIPS * self._smoothed
-        return min(LONGEST_TIMEOUT, base * 2.0**self._doublings)
+        doublings = min(_MOST_DOUBLINGS, self._repeats + self._needless)
+        return min(LONGEST_TIMEOUT, base * 2.0**doublings)
 
     def sample(self, round_trip: float) -> None:
         """The answer to a tick that was sent once came after `round_trip` s."""
-        self._doublings = 0
+        self._needless = 0
         if self._smoothed is None:
             self._smoothed = round_trip
         else:
@@ -41,4 +48,12 @@ class RetransmissionTimer:
 
     def expired(self) -> None:
         """No answer came in time."""
-        self._doublings = min(_MOST_DOUBLINGS, self._doublings + 1)
+        self._repeats += 1
+
+    def over(self) -> None:
+        """A tick that was repeated has its answer."""
+        self._repeats = 0
+
+    def repeated_needlessly(self) -> None:
+        """A second answer to a repeated tick: the first had been under way."""
+        self._needless += 1

@@ -185,12 +185,61 @@ def test_the_round_trip_is_never_estimated_from_a_repeated_tick() -> None:
     c = Clock().in_flight()
     before = c.wait
     c.send_when_due()
+    assert c.wait == pytest.approx(2 * before)
     c.answer(2, after=0.2)
+    c.send()
+    assert c.wait == pytest.approx(before)
+
+
+def test_a_second_answer_to_a_repeated_tick_doubles_the_time_until_there_is_a_sample() -> None:
+    c = Clock().in_flight()
+    before = c.wait
+    c.send_when_due()
+    c.answer(2)
+    c.answer(2)  # before the next tick is sent, and a third answer says nothing more
+    c.answer(2)
     c.send()
     assert c.wait == pytest.approx(2 * before)
     c.answer(3, after=0.001)
     c.send()
     assert c.wait == pytest.approx(before)
+    c.answer(3)  # of a tick that was sent once: the link's own doing
+    c.answer(4, after=0.001)
+    c.send()
+    assert c.wait == pytest.approx(before)
+
+
+def test_a_round_trip_that_has_become_longer_than_the_time_out_is_measured_in_the_end() -> None:
+    c = Clock().in_flight()
+    long = 0.1  # s; that of the first tick was 1 ms
+    tick = 2
+    under_way = [c.now + long]
+    while tick < 60:
+        if c.clock.next_deadline() < under_way[0]:
+            if c.send_when_due():
+                under_way.append(c.now + long)
+            continue
+        c.now = under_way.pop(0)
+        c.answer(tick)
+        if c.simulation.tick > tick:
+            for _ in under_way:  # what was sent again is answered again
+                c.answer(tick)
+            tick = c.simulation.tick
+            c.send()
+            under_way = [c.now + long]
+    assert c.wait >= 3 * long
+
+
+def test_what_came_before_the_scenario_does_not_count_for_the_round_trip() -> None:
+    c = Clock()
+    c.answer(0, armed=False)
+    for tick in range(1, 5):
+        c.send()
+        c.answer(tick, armed=False, after=0.004)
+    c.send()
+    c.answer(5, after=0.001)
+    c.send()
+    assert c.wait == pytest.approx(10 * 0.001)
 
 
 def test_the_round_trip_is_counted_from_the_sending() -> None:

@@ -39,12 +39,27 @@ def test_the_timeout_is_ten_smoothed_round_trips_and_no_shorter_than_the_rfcs(
     assert ROUND_TRIPS * smoothed >= smoothed + 4 * variation
 
 
-def test_the_timeout_stays_doubled_until_there_is_a_sample() -> None:
+def test_the_timeout_doubles_with_each_repeat_of_a_tick_and_is_the_plain_one_for_the_next() -> None:
+    timer = RetransmissionTimer()
+    timer.sample(1e-4)
+    before = timer.timeout()
+    for repeat in range(1, 4):
+        timer.expired()
+        assert timer.timeout() == pytest.approx(2**repeat * before)
+    timer.over()
+    assert timer.timeout() == before
+
+
+def test_after_a_needless_repeat_the_timeout_stays_doubled_until_there_is_a_sample() -> None:
     timer = RetransmissionTimer()
     timer.sample(1e-4)
     before = timer.timeout()
     timer.expired()
+    timer.over()
+    timer.repeated_needlessly()
     assert timer.timeout() == pytest.approx(2 * before)
-    assert timer.timeout() == pytest.approx(2 * before)
+    timer.expired()
+    assert timer.timeout() == pytest.approx(4 * before)
+    timer.over()
     timer.sample(1e-4)
     assert timer.timeout() <= before
