@@ -6,10 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from controller.design.estimated_weights import estimated_weights
-from controller.design.lqr import Weights, sampled_gain, sampled_model
+from controller.design.lqr import Weights, block_diagonal, sampled_gain, sampled_model
 from controller.design.model import actuated_model, rotor_time_constant, with_integrator
 from controller.design.names import DESIGNS, ON_ESTIMATE
 from controller.design.remembered import remembered
@@ -39,7 +38,7 @@ ANTI_WINDUP_TIME = 1.0
 
 def paper_weights() -> Weights:
     """Section V.B: Q = 100·blkdiag(I18, 100·I3), R = I4."""
-    return Weights(100.0 * linalg.block_diag(np.eye(STATE_SIZE), 100.0 * np.eye(3)), np.eye(WRENCH_SIZE))
+    return Weights(100.0 * block_diagonal(np.eye(STATE_SIZE), 100.0 * np.eye(3)), np.eye(WRENCH_SIZE))
 
 
 def paper_lqr_weights() -> Weights:
@@ -199,4 +198,4 @@ def _with_lag(weights: Weights, rigid: int, size: int) -> Weights:
     """Weights for a model of `rigid` states, `size` with the lag: what lagging rotors give costs nothing."""
     state, integral = weights.Q[:rigid, :rigid], weights.Q[rigid:, rigid:]
     lag = np.zeros((size - rigid, size - rigid))
-    return Weights(linalg.block_diag(state, lag, integral), weights.R)
+    return Weights(block_diagonal(state, lag, integral), weights.R)

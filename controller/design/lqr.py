@@ -3,6 +3,8 @@
 A computer holds the inputs between samples, and its commands take effect late. `sampled_gain` minimises the
 continuous quadratic cost exactly for that loop: zero-order hold with the cost integrated between the samples
 (Van Loan 1978), and a prediction over the loop's delay.
+
+scipy is imported where it is called: a flight whose gains are kept (`kept`) does without.
 """
 
 from __future__ import annotations
@@ -11,7 +13,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
 from controller.design.model import LinearModel
 from controller.law.state import Array
@@ -43,8 +44,20 @@ class SampledGain(NamedTuple):
     """(delay, m, m), the newest past input first"""
 
 
+def block_diagonal(*blocks: Array) -> Array:
+    """Square matrices along the diagonal of one."""
+    out = np.zeros((sum(map(len, blocks)),) * 2)
+    at = 0
+    for block in blocks:
+        out[at : at + len(block), at : at + len(block)] = block
+        at += len(block)
+    return out
+
+
 def continuous_gain(model: LinearModel, weights: Weights) -> Array:
     """K (m, n) of u = -K x that minimises the cost in continuous time (the paper's design)."""
+    from scipy import linalg
+
     riccati = linalg.solve_continuous_are(model.A, model.B, weights.Q, weights.R)
     return np.asarray(linalg.solve(weights.R, model.B.T @ riccati))
 
@@ -55,6 +68,8 @@ def sampled_model(model: LinearModel, weights: Weights, period: float) -> Sample
     exp([[-F', W], [0, F]] h) = [[*, G], [0, E]] with F = [[A, B], [0, 0]] and W = blkdiag(Q, R) gives the
     transition E = [[A_d, B_d], [0, I]] and the cost of one period E'G.
     """
+    from scipy import linalg
+
     n, m = model.B.shape
     size = n + m
     dynamics = np.zeros((size, size))
@@ -64,7 +79,7 @@ def sampled_model(model: LinearModel, weights: Weights, period: float) -> Sample
     step = period / 2**pieces
     block = np.zeros((2 * size, 2 * size))
     block[:size, :size] = -dynamics.T
-    block[:size, size:] = linalg.block_diag(weights.Q, weights.R)
+    block[:size, size:] = block_diagonal(weights.Q, weights.R)
     block[size:, size:] = dynamics
     exponential = linalg.expm(block * step)
     transition = exponential[size:, size:]
@@ -82,6 +97,8 @@ def sampled_gain(sampled: SampledModel, delay: int = 0) -> SampledGain:
     What happens before a command can act is settled, so the optimum is the delay-free gain applied to the
     state predicted `delay` periods ahead from the commands already under way.
     """
+    from scipy import linalg
+
     a, b = sampled.A, sampled.B
     riccati = linalg.solve_discrete_are(a, b, sampled.Q, sampled.R, s=sampled.N)
     gain = np.linalg.solve(sampled.R + b.T @ riccati @ b, b.T @ riccati @ a + sampled.N.T)

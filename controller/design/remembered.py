@@ -1,4 +1,6 @@
-"""Results of pure functions of a description, kept within a process: equal inputs are not computed twice.
+"""Results of pure functions of a description: equal inputs are not computed twice in a process.
+
+A command that flies keeps them on disk, too (`kept`).
 
 In a study most flights have the same vehicle, or the same way to go. Inputs count to the last bit.
 """
@@ -14,6 +16,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
+from controller.design import kept
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -26,6 +30,7 @@ def remembered(most: int) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         known: OrderedDict[Hashable, Any] = OrderedDict()
         lock = threading.Lock()
+        name = f"{function.__module__}.{function.__qualname__}"
 
         @wraps(function)
         def call(*arguments: Any, **named: Any) -> Any:
@@ -34,7 +39,10 @@ def remembered(most: int) -> Callable[[F], F]:
                 if key in known:
                     known.move_to_end(key)
                     return known[key].copy()
-            found = function(*arguments, **named)
+            found = kept.find(name, key)
+            if found is None:
+                found = function(*arguments, **named)
+                kept.keep(name, key, found)
             with lock:
                 known[key] = found.copy()
                 if len(known) > most:

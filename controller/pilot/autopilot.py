@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.design.catalogue import design
+from controller.design.motion.prepared import PreparedMotion
 from controller.design.names import ON_ESTIMATE
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
@@ -35,9 +36,6 @@ class Autopilot:
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
         self._controls = controls
-        # Here, because it takes scipy's optimizer: nothing else in flight does.
-        from controller.design.motion.prepared import PreparedMotion
-
         expected = path_from(vehicle.initial_load_position)
         self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)
         self._path_from = path_from

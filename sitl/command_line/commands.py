@@ -177,6 +177,7 @@ def _control(
     arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario | None, events: TextIO
 ) -> dict[str, Any] | int:
     """Run a controller; what there is to report of it, or over a flight stack the exit code."""
+    from controller.design.kept import keep_on_disk
     from controller.run import ControllerOptions, run
     from sitl.flights.hold import check_design
     from sitl.flights.refusals import check_feasible
@@ -187,6 +188,7 @@ def _control(
         from sitl.command_line.over import run_over
 
         return run_over(arguments, vehicle, scenario)
+    keep_on_disk()
     check_feasible(scenario, vehicle, arguments.design)
     if law is not None:
         from controller.own_law.find import make
@@ -218,6 +220,7 @@ def _control(
 
 
 def _fly(arguments: argparse.Namespace) -> int:
+    from controller.design.kept import keep_on_disk
     from controller.ground.link.ports import STATION_LOCAL
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
@@ -259,6 +262,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         in_process=arguments.in_process,
         law=law,
     )
+    keep_on_disk()
     stop = StopRequest()
     stop.install()
     if isinstance(scenario.reference, GroundControl):

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import TextIO
 
 SHARED_LIBRARY, OBJECT, TRANSLATION = ".so", ".o", ".bc"
+RESULT = ".npy"
+"""An array that was computed from a description: not code, but kept in the same way."""
 _DIGEST_SIZE = hashlib.sha256().digest_size
 _DAY = 86_400.0
 _KEPT = 30 * _DAY
@@ -91,8 +93,17 @@ def forget_unused(places: Sequence[Path]) -> None:
                     os.unlink(entry)
 
 
+def keep_newest(kind: str, most: int, places: Sequence[Path]) -> None:
+    """Delete files of this kind but for so many in each place, those that were used longest ago."""
+    for directory in places:
+        with suppress(OSError):
+            files = [entry for entry in os.scandir(directory) if Path(entry.name).suffix == kind]
+            for entry in sorted(files, key=lambda entry: entry.stat().st_mtime)[:-most]:
+                os.unlink(entry)
+
+
 def code_of(file: Path) -> bytes:
-    """The machine code in a file, without the digest at its end."""
+    """What was stored in a file, without the digest at its end."""
     return file.read_bytes()[:-_DIGEST_SIZE]
 
 

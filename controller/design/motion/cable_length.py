@@ -1,4 +1,7 @@
-"""The cable's length along a planned motion: behind its tension by c/k, which fast motions notice."""
+"""The cable's length along a planned motion: behind its tension by c/k, which fast motions notice.
+
+scipy is imported where it is called: a flight whose motion is kept (`kept`) does without.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy import linalg
-from scipy.interpolate import BSpline, PPoly
 
 from controller.law.reference import MOST_PIECES, OTHER_LAGS, PIECE_ORDER
 from controller.law.state import Array
@@ -46,6 +47,8 @@ def planned_lengths(tension: Array, duration: float, cable: Cable) -> Array:
 
 def _lagging_pieces(steady: Array, duration: float, lag: float) -> Array:
     """Pieces (MOST_PIECES, 8) of what follows steady (SAMPLES,) with a lag, s."""
+    from scipy.interpolate import BSpline, PPoly
+
     length = lagging(steady, duration / (SAMPLES - 1), lag)
     columns, at_end = _columns()
     coefficients = np.zeros(columns.shape[1])
@@ -69,12 +72,16 @@ def lagging(steady: Array, spacing: float, lag: float) -> Array:
     share = lag / spacing * (1.0 - decay)
     driven = (share - decay) * steady[:-1] + (1.0 - share) * steady[1:]
     powers = decay ** np.arange(float(len(steady)))
-    return np.asarray(np.tril(linalg.toeplitz(powers)) @ np.concatenate([steady[:1], driven]))
+    order = np.arange(len(steady))
+    past = np.tril(powers[np.abs(order[:, None] - order)])
+    return np.asarray(past @ np.concatenate([steady[:1], driven]))
 
 
 @lru_cache(maxsize=1)
 def _columns() -> tuple[Array, Array]:
     """The spline at the samples for each coefficient, and at the end its derivatives for the last ones."""
+    from scipy.interpolate import BSpline
+
     times = np.linspace(0.0, 1.0, SAMPLES)
     count = len(_KNOTS) - _DEGREE - 1
     spline = BSpline(_KNOTS, np.eye(count), _DEGREE)

@@ -5,6 +5,8 @@ so that moments begin and end without a jump. Its unknowns are the coefficients 
 duration. Sequential linear programming finds them: the limits are linearised along the motion so far, and the
 shortest motion is sought not far from it. What it finds is stretched until it keeps every limit; so any
 outcome is feasible, and the smooth step that it begins with is the slowest one.
+
+scipy is imported where it is called: a flight whose motion is kept (`kept`) does without.
 """
 
 from __future__ import annotations
@@ -13,8 +15,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline, PPoly
-from scipy.optimize import linprog
 
 from controller.design.motion.straight_line import ORDERS, StraightLine
 from controller.law.reference import MOST_PIECES, PIECE_ORDER, SMOOTH_STEP
@@ -72,6 +72,8 @@ class _Basis(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _basis(samples: int) -> _Basis:
+    from scipy.interpolate import BSpline, PPoly
+
     inner = MOST_PIECES - 5
     knots = np.concatenate([np.zeros(5), np.linspace(0.0, 1.0, MOST_PIECES + 1), np.ones(5)])
     times = np.linspace(0.0, 1.0, samples)
@@ -180,6 +182,8 @@ class _Search:
 
     def step(self, coefficients: Array, duration: float, reach: float, shortest: float) -> _Step | None:
         """The fastest motion, by the limits' linearisation, within reach (m/s²); None: there is none."""
+        from scipy.optimize import linprog
+
         basis = _basis(_SAMPLES)
         unit = duration**2 / self._line.distance  # of a coefficient, for 1 m/s² of acceleration
         count = len(coefficients)

@@ -12,7 +12,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import PPoly
 
 from controller.design.motion.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
 from controller.design.motion.fastest import fastest
@@ -215,9 +214,20 @@ def _shares(path: Path, times: Array) -> Array:
     pieces = int(path["pieces"][0])
     if pieces == 0:
         return np.array([derivative(times) for derivative in _SMOOTH_STEP])
-    scaled = (
-        path["profile"][0, :pieces].T[::-1]
-        * float(pieces) ** np.arange(PIECE_ORDER - 1.0, -1.0, -1.0)[:, None]
-    )
-    profile = PPoly(scaled, np.linspace(0.0, 1.0, pieces + 1))
-    return np.array([profile(times, order) for order in range(3)])
+    return np.array([_derivative(path["profile"][0, :pieces], times, order) for order in range(3)])
+
+
+def _derivative(profile: Array, times: Array, order: int) -> Array:
+    """A derivative of a piecewise polynomial (pieces, 8), see `reference.Path`, at times (n,) from 0 to 1.
+
+    With the operations of scipy's PPoly in their order: motions stay the same to the last bit.
+    """
+    joints = np.linspace(0.0, 1.0, len(profile) + 1)
+    piece = np.clip(np.searchsorted(joints, times, side="right") - 1, 0, len(profile) - 1)
+    within, power = times - joints[piece], np.ones(len(times))
+    out = np.zeros(len(times))
+    for exponent in range(order, PIECE_ORDER):
+        coefficients = profile[:, exponent] * float(len(profile)) ** exponent
+        out = out + coefficients[piece] * power * float(math.perm(exponent, order))
+        power = power * within
+    return out
