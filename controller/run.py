@@ -13,6 +13,7 @@ from controller.feedback.truth import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import AwakeClock
+from controller.pilot.terms_log import TermsLog
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.links.link import Link
@@ -50,7 +51,7 @@ class ControllerOptions:
     """With `path_from` None: how ground control reaches the vehicle."""
     feedback: str = "truth"
     out: Path | None = None
-    """Where the estimate's log goes."""
+    """Where the logs of estimate and law go."""
     logs: Logs = "usual"
     """How much goes there."""
     law: ChosenLaw | None = None
@@ -58,13 +59,18 @@ class ControllerOptions:
 
 
 class Session(NamedTuple):
-    """The autopilot's side of the HIL link without the link; the caller closes log and guided."""
+    """The autopilot's side of the HIL link without the link; the caller closes logs and guided."""
 
     hil: HilSession
-    log: EstimateLog | None
+    logs: tuple[EstimateLog | TermsLog, ...]
     guided: Guided | None
     """What ground control needs of it."""
     own_law: OwnLawPilot | None
+
+    def close_logs(self) -> None:
+        """Write out everything; raises what went wrong while writing."""
+        for log in self.logs:
+            log.close()
 
 
 def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict[str, Any]:
@@ -89,8 +95,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         if session.guided is not None:
             session.guided.close()
         link.close()
-        if session.log is not None:
-            session.log.close()
+        session.close_logs()
     failure = own_law.failure if own_law is not None else None
     if failure is not None:
         speaker.say(str(failure))
@@ -107,7 +112,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
 
 
 def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
-    """A session with the autopilot, feedback and log that the options ask for.
+    """A session with the autopilot, feedback and logs that the options ask for.
 
     Whatever the cable is, the controller takes it for the linear one that
     it acts as about hover.
@@ -124,12 +129,15 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
         design = ON_ESTIMATE if design == "default" else design
     elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
         log, feedback = _estimating_beside(options)
+    terms_log = None if options.out is None else TermsLog(options.out, options.logs)
+    logs = tuple(each for each in (log, terms_log) if each is not None)
     instance, say, rate = options.instance, speaker.say, options.rate_hz
     if options.path_from is None:
         from controller.pilot.ground_session import Guided
 
         guided = Guided(options.vehicle, rate, instance, _ground(options), say, assessor)
-        return Session(new_session(guided.autopilot, instance, say, feedback, rate), log, guided, None)
+        hil = new_session(guided.autopilot, instance, say, feedback, rate, terms_log)
+        return Session(hil, logs, guided, None)
     path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
 
     own_law: OwnLawPilot | None = None
@@ -143,8 +151,8 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
         own_law = OwnLawPilot(options.law, options.vehicle, rate, path_from, controls)
         return own_law
 
-    hil = new_session(autopilot, instance, say, feedback, rate)
-    return Session(hil, log, None, own_law)
+    hil = new_session(autopilot, instance, say, feedback, rate, terms_log)
+    return Session(hil, logs, None, own_law)
 
 
 def _ground(options: ControllerOptions) -> GroundOptions:

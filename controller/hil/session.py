@@ -7,7 +7,7 @@ overtaken gets none.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from pymavlink.dialects.v20 import common
 
@@ -20,6 +20,9 @@ from controller.law.state import Array
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_TRUTH, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
 from sitl_bridge.mavlink.hil import ODOMETRY
+
+if TYPE_CHECKING:
+    from controller.pilot.terms_log import TermsLog
 
 PLANT_TIMEOUT = 1.0
 """Silence of the plant after which it is said to be gone, s."""
@@ -44,6 +47,10 @@ class Pilot(Protocol):
     @property
     def law(self) -> Law | None:
         """The arrays of `control_step` while `step` does no more than that; None: `step` is to be called."""
+
+    @property
+    def terms(self) -> Array | None:
+        """What the last command is made of, see `terms_log.Termed`."""
 
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31, of the tick of `time_usec`."""
@@ -70,6 +77,7 @@ class HilSession:
         say: Callable[[str], None],
         feedback: Feedback,
         tick_rate: TickRate | None = None,
+        terms_log: TermsLog | None = None,
     ) -> None:
         self.steps = 0
         """Control steps made."""
@@ -81,6 +89,7 @@ class HilSession:
         autopilot.attend(self._reader)
         self._feedback = feedback
         self._tick_rate = tick_rate
+        self._terms_log = terms_log
         self._plain_tick: PlainTick | None = None
         self._instance = instance
         self._out: list[bytes] = []
@@ -125,6 +134,8 @@ class HilSession:
                 self._feedback.restart()
                 if self._tick_rate is not None:
                     self._tick_rate.restart()
+                if self._terms_log is not None:
+                    self._terms_log.restart()
             self._answer(tick.time_usec, tick, now)
         else:
             return  # overtaken by a newer tick
@@ -140,6 +151,8 @@ class HilSession:
         packer.next_sequence()
         self.steps += 1
         self._last_time = reader.time_usec
+        if self._terms_log is not None:
+            self._terms_log.tick(self._last_time, self._autopilot)
         self._last_answer = bytes(self._writer.view[:size])
         self._out.append(self._last_answer)
         self._last_heard = now
@@ -157,6 +170,8 @@ class HilSession:
                 )
             self._feedback.flown(self._writer.controls, self._autopilot.armed)
             self.steps += 1
+            if self._terms_log is not None and self._autopilot.armed:
+                self._terms_log.tick(time_usec, self._autopilot)
             law = self._autopilot.law
             if self._plain_tick is None and law is not None:
                 self._plain_tick = self._feedback.plain_tick(self._reader, law, self._writer)
@@ -211,6 +226,7 @@ def new_session(
     say: Callable[[str], None],
     feedback: Feedback | None = None,
     rate_hz: float | None = None,
+    terms_log: TermsLog | None = None,
 ) -> HilSession:
     """A session of one instance with the autopilot that `make_autopilot` builds around its controls (16,).
 
@@ -226,4 +242,5 @@ def new_session(
         say,
         feedback or TruthFeedback(),
         None if rate_hz is None else TickRate(rate_hz, say),
+        terms_log,
     )

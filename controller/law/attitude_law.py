@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from controller.law.allocation import ALLOCATION, MOST_ROTORS, allocate
 from controller.law.control_law import WORK
-from controller.law.state import STATE_SIZE, Array
+from controller.law.state import STATE_SIZE, WRENCH_SIZE, Array
+from controller.law.terms import DELAY, FEEDFORWARD_TERM, INTEGRAL, PROPORTIONAL, SATURATED
 from sitl_bridge.compiled import Buffer, entry_point, kernel
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Vehicle
@@ -111,7 +112,8 @@ def attitude_step(laws: Any, allocations: Any, works: Any, estimate: Array, cont
     """Rotor commands (16,), 0..1, for an estimate (18,), eq. 31; returns 1 when a rotor limit was met."""
     law, work = laws[0], works[0]
     rates, wrench = estimate[12:15], work.wrench
-    error = work.integral  # scratch here: (3,)
+    error, terms = work.integral, work.terms  # error: scratch here, (3,)
+    terms[PROPORTIONAL, 0] = terms[INTEGRAL, 0] = 0.0
     if law.has_attitude:
         _attitude_error(estimate[15], estimate[16], estimate[17], law.attitude, error)
     for i in range(3):
@@ -124,6 +126,8 @@ def attitude_step(laws: Any, allocations: Any, works: Any, estimate: Array, cont
             asked = rates[i]
         error[i] = asked - rates[i]
         wrench[1 + i] = law.inertia[i] * (law.rate_gain[i] * error[i] + law.integral[i])
+        terms[PROPORTIONAL, 1 + i] = law.inertia[i] * law.rate_gain[i] * error[i]
+        terms[INTEGRAL, 1 + i] = law.inertia[i] * law.integral[i]
     # The gyroscopic moment of the turning body.
     h0, h1, h2 = law.inertia[0] * rates[0], law.inertia[1] * rates[1], law.inertia[2] * rates[2]
     wrench[1] += rates[1] * h2 - rates[2] * h1
@@ -131,6 +135,10 @@ def attitude_step(laws: Any, allocations: Any, works: Any, estimate: Array, cont
     wrench[3] += rates[0] * h1 - rates[1] * h0
     wrench[0] = law.thrust
     limited = allocate(allocations[0], wrench, controls, work.achieved, work.rotors)
+    for k in range(WRENCH_SIZE):
+        terms[FEEDFORWARD_TERM, k] = wrench[k] - terms[PROPORTIONAL, k] - terms[INTEGRAL, k]
+        terms[DELAY, k] = 0.0
+        terms[SATURATED, k] = work.achieved[k] - wrench[k]
     for i in range(3):
         step = 0.0 if limited else law.period * law.rate_integral_gain[i] * error[i]
         law.integral[i] = min(max(law.integral[i] + step, -LARGEST_INTEGRAL), LARGEST_INTEGRAL)

@@ -28,6 +28,7 @@ from controller.law.state import (
     WRENCH_SIZE,
     Array,
 )
+from controller.law.terms import DELAY, FEEDFORWARD_TERM, INTEGRAL, PROPORTIONAL, SATURATED, TERMS
 from sitl_bridge.compiled import kernel
 from sitl_bridge.ids import ACTUATOR_CONTROLS
 
@@ -80,6 +81,7 @@ WORK = np.dtype(
         ("wrench", "f8", WRENCH_SIZE),  # u, as the law wants it
         ("held_back", "f8", 2),  # of the moments about x and y, N m: what would lean beyond the limit
         ("achieved", "f8", WRENCH_SIZE),  # what the limited rotors give of it
+        ("terms", "f8", (len(TERMS), WRENCH_SIZE)),  # what `achieved` is the sum of
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("heading", "f8", 2),  # cosine and sine of the reference's yaw
         ("frame", "f8", (3, 3)),  # rows: x, y, z axes, in the world, of the model that the gains are for
@@ -222,14 +224,20 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
     memory.ticks += 1
     for k in range(WRENCH_SIZE):
         u = work.feedforward[k]
+        work.terms[FEEDFORWARD_TERM, k] = u
         for i in range(STATE_SIZE):
             u -= design.state_gain[k, i] * work.deviation[i]
+        work.terms[PROPORTIONAL, k] = u - work.feedforward[k]
+        without_integral = u
         for axis in range(3):
             u -= design.integral_gain[k, axis] * work.integral[axis]
+        work.terms[INTEGRAL, k] = u - without_integral
+        without_delay = u
         for j in range(WRENCH_SIZE):
             u -= design.lag_gain[k, j] * memory.rotors[j]
             for age in range(design.delay):
                 u -= design.past_gain[age, k, j] * memory.past[age, j]
+        work.terms[DELAY, k] = u - without_delay
         work.wrench[k] = u
     work.held_back[0] = work.held_back[1] = 0.0
     if design.largest_lean > 0.0:
@@ -274,12 +282,12 @@ def remember(design: Any, memory: Any, work: Any) -> None:
         for age in range(oldest, 0, -1):
             memory.past[age, k] = memory.past[age - 1, k]
         memory.past[0, k] = under_way
+        work.terms[SATURATED, k] = work.achieved[k] - work.wrench[k]
+        if k == 1 or k == 2:
+            work.terms[SATURATED, k] -= work.held_back[k - 1]
     for axis in range(3):
         for k in range(WRENCH_SIZE):
-            short = work.achieved[k] - work.wrench[k]
-            if k == 1 or k == 2:
-                short -= work.held_back[k - 1]
-            work.integral[axis] += design.anti_windup[axis, k] * short
+            work.integral[axis] += design.anti_windup[axis, k] * work.terms[SATURATED, k]
     _out_of(work.frame, work.integral)
     for axis in range(3):
         memory.integral[axis] = work.integral[axis]

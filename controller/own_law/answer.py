@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from controller.law.state import Array
+from controller.law.state import WRENCH_SIZE, Array
+from controller.law.terms import SATURATED, TERMS
 from controller.own_law.blame import one_line
 
 EXPECTED = "expected (thrust, moments) in N and N m, with three moments, or {rotors} rotor commands in 0..1"
@@ -43,3 +45,24 @@ def read(answer: Any, rotors: int) -> Commands | str:
     if not ((commands >= 0.0) & (commands <= 1.0)).all():
         return f"returned rotor commands {one_line(commands.tolist())}; {expected}"
     return Commands(None, commands)
+
+
+TERM_NAMES = TERMS[:SATURATED]
+"""Terms that a law may tell; what the rotors' limits take away is seen from its wrench."""
+
+
+def read_terms(told: Any, terms: Array) -> str | None:
+    """Put wrenches (4,) by name into terms (5, 4), 0 for what is not told; or what is wrong with them."""
+    expected = f"expected wrenches of four numbers by the names {', '.join(TERM_NAMES)}"
+    if not isinstance(told, Mapping) or not told.keys() <= set(TERM_NAMES):
+        return f"keeps {one_line(told)} in `terms`; {expected}"
+    terms[:] = 0.0
+    for name, wrench in told.items():
+        try:
+            row = np.asarray(wrench, dtype=np.float64)
+        except (TypeError, ValueError):
+            return f"keeps {one_line(wrench)} in `terms`; {expected}"
+        if row.shape != (WRENCH_SIZE,):
+            return f"keeps an array of shape {row.shape} in `terms`; {expected}"
+        terms[TERMS.index(name)] = row
+    return None

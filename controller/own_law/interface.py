@@ -83,7 +83,11 @@ class OwnLaw(Protocol):
         """vehicle: as the controller is told; rate_hz: calls of `step` a second."""
 
     def step(self, estimate: Estimate, reference: Reference) -> Answer:
-        """What the rotors are to do until the next tick."""
+        """What the rotors are to do until the next tick.
+
+        A law that returns a wrench may keep what it is the sum of in an attribute `terms`: wrenches (4,), N
+        and N m, by the names `feedforward`, `proportional`, `integral`, `delay`. They are logged.
+        """
 
 
 class LawError(RuntimeError):

@@ -25,6 +25,7 @@ from controller.law.state import (
     WRENCH_SIZE,
     Array,
 )
+from controller.law.terms import SATURATED
 from controller.own_law import answer
 from controller.own_law.blame import cause, place_of
 from controller.own_law.find import ChosenLaw, make
@@ -63,9 +64,10 @@ class OwnLawPilot:
         self._motion, self._raw = np.zeros((2, MOTION_ROWS, 3))
         self._scratch = np.zeros(MOTION_ROWS)
         self._wrench = np.zeros(WRENCH_SIZE)
-        self._allocate = allocate_wrench.bind(
-            allocation(vehicle), np.zeros(1, dtype=WORK), self._wrench, controls
-        )
+        self._work = np.zeros(1, dtype=WORK)
+        self._allocate = allocate_wrench.bind(allocation(vehicle), self._work, self._wrench, controls)
+        self.terms: Array | None = None
+        """See `terms_log.Termed`."""
         self._steps = self._total_ns = self._worst_ns = 0
 
     @property
@@ -122,9 +124,25 @@ class OwnLawPilot:
         if commands.wrench is not None:
             self._wrench[:] = commands.wrench
             self._allocate()
+            wrong = self._read_terms()
+            if wrong is not None:
+                self._fail(time_s, f"{wrong}{place_of(self._flying.step)}")
+                return
         else:
             self._controls[: self._rotors] = commands.rotors
         self.armed = True
+
+    def _read_terms(self) -> str | None:
+        """Take the terms that the law tells, if it does; returns what is wrong with them."""
+        told = getattr(self._flying, "terms", None)
+        if told is None:
+            self.terms = None
+            return None
+        terms = self._work["terms"][0]
+        wrong = answer.read_terms(told, terms)
+        terms[SATURATED] = self._work["achieved"][0] - self._wrench
+        self.terms = terms.reshape(-1)
+        return wrong
 
     def _reference(self, path: Path, time_s: float) -> Reference:
         self._reference_at(time_s)

@@ -35,6 +35,8 @@ class Autopilot:
         self.armed = False
         self.law: Law | None = None
         """While it flies: the arrays of `control_step` in front of estimate and controls."""
+        self.terms: Array | None = None
+        """See `terms_log.Termed`."""
         self._controls = controls
         expected = path_from(vehicle.initial_load_position)
         self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)
@@ -50,7 +52,7 @@ class Autopilot:
         """Stop the rotors; the next step arms and starts afresh."""
         self.armed = False
         self._step = None
-        self.law = None
+        self.law = self.terms = None
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""
@@ -60,8 +62,10 @@ class Autopilot:
         if self._step is None:
             path = planned_from(self._path_from, estimate, self._motion.planned)
             memory = engaged_memory(estimate[LOAD_POSITION])
-            law = (self._design, self._allocation, path, memory, np.zeros(1, dtype=WORK))
+            work = np.zeros(1, dtype=WORK)
+            law = (self._design, self._allocation, path, memory, work)
             self._step = control_step.bind(*law, estimate, self._controls)
             self.law = law
+            self.terms = work["terms"].reshape(-1)
             self.armed = True
         self._step()

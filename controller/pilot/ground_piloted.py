@@ -157,6 +157,11 @@ class GuidedAutopilot:
         """Whether the rotors turn."""
         return self.station.armed
 
+    @property
+    def terms(self) -> Array | None:
+        """What the last command is made of, see `terms_log.Termed`."""
+        return None if self._law is None and not self._steered else self._work["terms"].reshape(-1)
+
     def attend(self, reader: TickReader) -> None:
         """Ground control is shown what accelerometer and GPS receiver say."""
         self._accelerometer = reader.sensed["accelerometer"][0]

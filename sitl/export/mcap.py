@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sitl.recording.recording import Array, Recording
+from sitl.recording.recording import Array, Columns, Recording
 from sitl.recording.sensors import SensorLog, read_sensors
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.log_amount import Logs
@@ -34,7 +34,9 @@ def write_mcap(recording: Recording, file: Path, rate_hz: float = RATES_HZ["all"
         for row in _rows(recording.times, SLOW_HZ):
             writer.slow(row)
         if recording.estimates is not None:
-            writer.estimates(recording.estimates)
+            writer.columns("/estimate", recording.estimates)
+        if recording.terms is not None:
+            writer.columns("/terms", recording.terms)
         if recording.tlog is not None:
             writer.sensors(read_sensors(recording.tlog))
         writer.outcome()
@@ -153,13 +155,13 @@ class _FlightWriter:
         bodies = [self._scene.vehicle_entity(stamp, vehicle), self._scene.load_entity(stamp, vehicle)]
         self._bodies.log(m.SceneUpdate(entities=bodies), log_time=log_time)
 
-    def estimates(self, estimates: dict[str, Array]) -> None:
-        """The autopilot's estimate."""
-        names = [name for name in estimates if name != "time_s"]
-        channel = self._channel("/estimate", names)
-        for row in _rows(estimates["time_s"], self._rate_hz):
-            numbers = {name: _finite(estimates[name][row]) for name in names}
-            channel.log(numbers, log_time=self._time(float(estimates["time_s"][row]))[0])
+    def columns(self, topic: str, columns: Columns) -> None:
+        """A log of the autopilot's: its estimate, the terms of its law."""
+        names = [name for name in columns if name != "time_s"]
+        channel = self._channel(topic, names)
+        for row in _rows(columns["time_s"], self._rate_hz):
+            numbers = {name: _finite(columns[name][row]) for name in names}
+            channel.log(numbers, log_time=self._time(float(columns["time_s"][row]))[0])
 
     def sensors(self, log: SensorLog) -> None:
         """HIL_SENSOR and HIL_GPS in wire units and frames."""

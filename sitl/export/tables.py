@@ -26,13 +26,14 @@ def write_csv(recording: Recording, file: Path) -> None:
 
 
 def write_mat(recording: Recording, file: Path) -> None:
-    """A MATLAB 5 file: structs `states`, `estimates` (if there are any) and `reference`, columns by name."""
+    """A MATLAB 5 file: structs `states`, and if there are any `estimates` and `terms`; matrix `reference`."""
     from scipy.io import savemat
 
     variables: dict[str, object] = {
         "states": {name: column[:, None] for name, column in recording.states.items()},
         "reference": recording.reference,
     }
-    if recording.estimates is not None:
-        variables["estimates"] = {name: column[:, None] for name, column in recording.estimates.items()}
+    for name, log in (("estimates", recording.estimates), ("terms", recording.terms)):
+        if log is not None:
+            variables[name] = {column: values[:, None] for column, values in log.items()}
     savemat(file, variables, long_field_names=True, do_compression=True)

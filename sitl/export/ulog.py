@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.law.state import WRENCH_SIZE
+from controller.law.terms import COMPONENTS, TERMS
 from sitl.export.ulog_format import ULogWriter
 from sitl.recording.recording import Array, Recording
 from sitl.recording.sensors import read_sensors
@@ -38,6 +40,7 @@ TOPICS = {
     ),
     "slung_load": _topic(*_POSITION, ("cable_length", "<f4"), ("cable_tension", "<f4")),
     "slung_load_setpoint": _topic(("x", "<f4"), ("y", "<f4"), ("z", "<f4")),
+    "law_terms": _topic(*((term, "<f4", WRENCH_SIZE) for term in TERMS)),
 }
 _NED = [1, 0, 2]
 _NED_SIGNS = np.array([1.0, 1.0, -1.0])
@@ -78,6 +81,7 @@ def _topics(recording: Recording) -> dict[str, NDArray[np.void]]:
         "actuator_motors": (times, controls),
         **_believed(recording, quaternion, truth, rates),
         **_sensed(recording),
+        **_terms(recording),
     }
     return {name: _records(name, *columns) for name, columns in out.items()}
 
@@ -114,6 +118,16 @@ def _sensed(recording: Recording) -> dict[str, Any]:
         "sensor_combined": (log.sensor_times, gyro, force),
         "sensor_gps": (log.fix_times, *place, fixes["fix_type"]),
     }
+
+
+def _terms(recording: Recording) -> dict[str, Any]:
+    """What the law's commands were made of: thrust and moments about FRD axes, for each term."""
+    log = recording.terms
+    if log is None:
+        return {}
+    signs = np.array([1.0, *_FRD_SIGNS])
+    terms = (np.stack([log[f"{term}_{part}"] for part in COMPONENTS], axis=1) * signs for term in TERMS)
+    return {"law_terms": (log["time_s"], *terms)}
 
 
 def _records(topic: str, times: Array, *columns: Array) -> NDArray[np.void]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from controller.law.terms import TERMS
 from sitl.recording.recording import Array, Columns, Recording
 
 FILE_NAME = "flight.html"
@@ -32,6 +33,14 @@ _PANELS = (
     "cable tension [N]",
     "rotors, share of the largest speed",
 )
+_TERM_PANELS = {
+    "thrust, term by term [N]": {"": "thrust_N"},
+    "moments, term by term [N m]": {" about x": "moment_x_N_m", " about y": "moment_y_N_m"},
+}
+"""Of flights whose law tells its terms: what is drawn of them."""
+MOST_TERM_POINTS = 500
+"""Of a line"""
+_TERM_COLOURS = dict(zip(TERMS, ("#7f7f7f", "#1f77b4", "#2ca02c", "#9467bd", "#d62728"), strict=True))
 
 
 def write_html(recording: Recording, file: Path) -> None:
@@ -106,7 +115,35 @@ def _figure(recording: Recording) -> dict[str, Any]:
     controls = recording.controls()
     for rotor in range(controls.shape[1]):
         line(5, f"rotor {rotor + 1}", controls[:, rotor], line={"width": 1})
+    _add_terms(traces, recording)
     return {"data": traces, "layout": _layout(recording)}
+
+
+def _titles(recording: Recording) -> list[str]:
+    """Of the panels from the top."""
+    return [*_PANELS, *(_TERM_PANELS if recording.terms is not None else ())]
+
+
+def _add_terms(traces: list[dict[str, Any]], recording: Recording) -> None:
+    """What the law's commands were made of; terms that were 0 all the time are left out."""
+    log = recording.terms
+    if log is None:
+        return
+    for panel, (_, parts) in enumerate(_TERM_PANELS.items(), len(_PANELS) + 1):
+        for (about, part), term in itertools.product(parts.items(), TERMS):
+            if not log[f"{term}_{part}"].any():
+                continue
+            x, y = envelope(log["time_s"], log[f"{term}_{part}"], MOST_TERM_POINTS)
+            style = {
+                "color": _TERM_COLOURS[term],
+                "width": 1,
+                "dash": "dot" if about == " about y" else "solid",
+            }
+            trace = {"type": "scatter", "mode": "lines", "legendgroup": str(panel), "line": style}
+            rounded = {
+                key: [float(f"{v:.4g}") for v in values.tolist()] for key, values in (("x", x), ("y", y))
+            }
+            traces.append({**trace, **rounded, "name": term + about, "xaxis": "x", "yaxis": f"y{panel}"})
 
 
 def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, colour: str) -> None:
@@ -132,21 +169,22 @@ def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, c
 
 def _layout(recording: Recording) -> dict[str, Any]:
     """Panels below each other on one time axis; slack stretches shaded."""
-    gap = 0.04
-    height = (1.0 - gap * (len(_PANELS) - 1)) / len(_PANELS)
+    gap = 0.03
+    titles = _titles(recording)
+    height = (1.0 - gap * (len(titles) - 1)) / len(titles)
     layout: dict[str, Any] = {
-        "height": 1150,
+        "height": 230 * len(titles),
         "margin": {"l": 70, "r": 20, "t": 20, "b": 50},
         "hovermode": "x unified",
         "legend": {"traceorder": "grouped"},
         "template": "plotly_white",
-        "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(_PANELS)}"},
+        "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(titles)}"},
         "shapes": [
             *_shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
             _limit(len(_PANELS)),
         ],
     }
-    for index, title in enumerate(_PANELS):
+    for index, title in enumerate(titles):
         top = 1.0 - index * (height + gap)
         axis = {"domain": [top - height, top], "title": {"text": title}}
         layout["yaxis" if index == 0 else f"yaxis{index + 1}"] = axis
@@ -235,7 +273,7 @@ th {{ text-align: left; font-weight: 500; padding-right: 1.5em; }}
 <body>
 <h1>{title}</h1>
 <p>{said}</p>
-<p>Grey stretches: the cable is slack. Dashed in the last panel: the rotors' largest speed.
+<p>Grey stretches: the cable is slack. Dashed beside the rotors: their largest speed.
 Click a name to hide its line, drag to zoom, double-click to go back.</p>
 <div id="figure"></div>
 <details><summary>All figures of the flight</summary><table>

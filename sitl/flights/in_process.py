@@ -161,8 +161,7 @@ def fly_in_process(
     except Diverged as error:
         failure = str(error)
     finally:
-        if session.log is not None:
-            session.log.close()
+        session.close_logs()
         if tlog is not None:
             tlog.close()
         if isinstance(recorder, StateLog):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.law.reference import Path as ReferencePath
+from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
 from sitl.flights.html_report import FILE_NAME as HTML_NAME
 from sitl.flights.metrics import Metrics, flight_metrics, reference_positions
@@ -33,6 +34,7 @@ FILES = (
     PICTURE_NAME,
     ESTIMATE_NAME,
     COVARIANCE_NAME,
+    TERMS_NAME,
     VEHICLE_NAME,
     REFERENCE_NAME,
     MCAP_NAME,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
+from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.state_log import FILE_NAME as STATES_NAME
 from sitl_bridge.vehicle.description import Vehicle
@@ -45,6 +46,8 @@ class Recording:
     """Columns of the estimate's log on its own rows; None: there is none."""
     covariance: Columns | None = None
     """Likewise of its covariance."""
+    terms: Columns | None = None
+    """Likewise of what the law's commands were made of; None: its law told none."""
 
     @property
     def times(self) -> Array:
@@ -114,15 +117,17 @@ def read_recording(folder: Path) -> Recording:
     set_points = [
         np.interp(states["time_s"], reference["time_s"], reference[name]) for name in REFERENCE_COLUMNS[1:]
     ]
-    estimates, covariance = folder / ESTIMATE_NAME, folder / COVARIANCE_NAME
+    logs = (folder / name for name in (ESTIMATE_NAME, COVARIANCE_NAME, TERMS_NAME))
+    estimates, covariance, terms = (read_columns(file) if file.exists() else None for file in logs)
     return Recording(
         folder,
         _summary(folder),
         read_vehicle(folder / VEHICLE_NAME),
         states,
         np.stack(set_points, axis=1),
-        read_columns(estimates) if estimates.exists() else None,
-        read_columns(covariance) if covariance.exists() else None,
+        estimates,
+        covariance,
+        terms,
     )
 
 

@@ -56,6 +56,8 @@ def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -
     }
     assert max(traces["x of the load"]["y"]) == pytest.approx(recording.states["load_x_m"].max(), rel=1e-5)
     assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
+    assert set(traces["saturated about y"]["y"]) == {18.0}
+    assert "feedforward" not in traces  # 0 all the time
 
 
 def test_the_band_is_two_standard_deviations_of_the_loads_position() -> None:

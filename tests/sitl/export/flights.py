@@ -10,6 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pymavlink.dialects.v20 import common
 
+from controller.law.terms import TERM_COLUMNS
+from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
 from sitl.recording.recording import SUMMARY_NAME, write_reference, write_vehicle
 from sitl_bridge.frames import quaternion_from_euler
 from sitl_bridge.mavlink.framing import Packer
@@ -26,7 +28,10 @@ BEGIN_USEC = 1_000_000
 
 
 def leave_flight(folder: Path, rows: int = ROWS) -> None:
-    """Write everything that a flight leaves, two seconds of it; no estimate."""
+    """Write everything that a flight leaves, two seconds of it; no estimate.
+
+    Column n of the law's terms is n.
+    """
     vehicle = load_vehicle("iris", [])
     times = np.arange(rows) / RATE_HZ
     names = columns(len(vehicle.rotors))
@@ -56,6 +61,8 @@ def leave_flight(folder: Path, rows: int = ROWS) -> None:
         "first_command_unix_s": 1.7e9,
     }
     (folder / SUMMARY_NAME).write_text(json.dumps(summary), encoding="utf-8")
+    terms = {name: np.full(rows, float(number)) for number, name in enumerate(TERM_COLUMNS)}
+    pq.write_table(pa.table({"time_s": times, **terms}), folder / TERMS_NAME)
     _leave_tlog(folder / TLOG_NAME, rows)
 
 

@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from pyulog import ULog
 from scipy.io import loadmat
 
+from controller.law.terms import TERM_COLUMNS
 from sitl.export.formats import WRITERS, export
 from sitl.recording.recording import RecordingError, read_recording
 from sitl_bridge.frames import LocalOrigin, attitude_to_ned_frd, enu_to_ned
@@ -42,6 +43,7 @@ def test_matlab_has_the_same_columns(folder: Path) -> None:
     assert set(loaded["states"]) == set(recording.states)
     np.testing.assert_array_equal(loaded["states"]["load_x_m"].ravel(), recording.states["load_x_m"])
     np.testing.assert_array_equal(loaded["reference"], recording.reference)
+    assert loaded["terms"]["saturated_moment_z_N_m"].tolist() == [19.0] * ROWS
 
 
 def test_ulog_is_in_ned_and_frd(folder: Path) -> None:
@@ -56,6 +58,7 @@ def test_ulog_is_in_ned_and_frd(folder: Path) -> None:
         assert [load[axis][row] for axis in "xyz"] == pytest.approx(expected, abs=1e-6)
         quaternion = attitude_to_ned_frd(tuple(recording.vectors("attitude_q{}", "wxyz")[row].tolist()))
         assert [attitude[f"q[{i}]"][row] for i in range(4)] == pytest.approx(quaternion, abs=1e-6)
+    assert [topics["law_terms"][f"saturated[{i}]"][-1] for i in range(4)] == [16.0, 17.0, -18.0, -19.0]
     heading = topics["vehicle_local_position_groundtruth"]["heading"]
     yaw = (ROWS - 1) / RATE_HZ  # of the flight, from east to the north
     assert heading[-1] == pytest.approx(np.pi / 2 - yaw, abs=1e-6)
@@ -89,12 +92,15 @@ def test_mcap_has_frames_scene_places_and_numbers(folder: Path) -> None:
             (message.log_time, json.loads(message.data))
             for _, _, message in reader.iter_messages(topics=["/state"])
         ]
+        terms = [json.loads(m.data) for _, _, m in reader.iter_messages(topics=["/terms"])]
         sensors = [json.loads(m.data) for _, _, m in reader.iter_messages(topics=["/sensors"])]
     first, last = rows[0], rows[-1]
     assert last[0] - first[0] == round((ROWS - 1) / RATE_HZ * 1e9)
     assert last[1]["load_x_m"] == float(f"{recording.states['load_x_m'][-1]:.7g}")
     assert len(rows) == len(range(0, ROWS - 1, 5)) + 1
     assert sensors[0]["zacc"] == -9.75
+    assert len(terms) == len(rows)
+    assert [terms[-1][name] for name in TERM_COLUMNS] == list(range(20))
 
 
 def test_mcap_location_is_the_loads_place_on_earth(folder: Path) -> None:
