@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from controller.estimator.correct.receiver_wander import begin_wander
 from controller.estimator.correct.update import set_part
 from controller.estimator.records import (
     ATTITUDE,
@@ -104,6 +105,9 @@ def align(f: Filter, given: Any) -> None:
         for j in range(ERROR_SIZE):
             f.P[i, j] = 0.0
         f.P[i, i] = p.initial_std[i] * p.initial_std[i]
+    begin_wander(f, m.align_gps)
+    if p.gps_wander_std[2] > 0.0:
+        x[X_BARO_OFFSET] = p.home_altitude
     for axis in range(3):
         x[X_LOAD + axis] = p.initial_load[axis]
         mean = m.align_sum[3 + axis] / count
@@ -117,8 +121,9 @@ def align(f: Filter, given: Any) -> None:
         f.P[ATTITUDE, ATTITUDE] = IN_FLIGHT_TILT_STD**2
         f.P[ATTITUDE + 1, ATTITUDE + 1] = IN_FLIGHT_TILT_STD**2
         if not m.align_gps:
-            x[X_BARO_OFFSET] = 0.0
-            set_part(f, BARO_OFFSET, 1, UNKNOWN_PLACE_STD)
+            if p.gps_wander_std[2] == 0.0:
+                x[X_BARO_OFFSET] = 0.0
+                set_part(f, BARO_OFFSET, 1, UNKNOWN_PLACE_STD)
             set_part(f, POSITION, 3, UNKNOWN_PLACE_STD)
             set_part(f, VELOCITY, 3, IN_FLIGHT_SPEED_STD)
             m.next_clone = m.time

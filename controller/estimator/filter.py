@@ -38,6 +38,8 @@ from sitl_bridge.vehicle.description import Vehicle, hover_rotor_speeds
 Sequence3 = tuple[float, float, float] | Array
 
 
+UNKNOWN_POSITION = 3.0
+"""m, standard deviation beyond the usual error of a receiver that wanders: the position is not known."""
 REFUSED_TIME = 1.0
 """s for which GPS is refused, until that is a state of affairs and not an outlier."""
 
@@ -330,7 +332,7 @@ class Estimator:
             aligned=self.aligned,
             attitude=self.aligned and tilt < 0.1,
             velocity=self.aligned and velocity < 1.0,
-            position=self.aligned and position < 3.0,
+            position=self.aligned and position < math.hypot(UNKNOWN_POSITION, self.tuning.gps_wander_std[0]),
             load=self.aligned and hanging and load < 0.3 * self.vehicle.hover_length,
             dead_reckoning=gps_age > 1.0,
             gps_glitch=refused > 0,

@@ -72,10 +72,12 @@ LOAD_ON_CABLE, LOAD_ON_GROUND, LOAD_RELEASED, LOAD_DROPPED = 0, 1, 2, 3
 """Released: gone, nobody knows where to. Dropped: off its hook, and lying on the ground."""
 
 # Remembered instants, for measurements that arrive late: six numbers each.
-CLONES = 6
+CLONES = 7
 CLONE_ROWS = 6
 CLONE_SIZE = CLONES * CLONE_ROWS
-CLONE_FREE, CLONE_MOTION, CLONE_LOAD = 0, 1, 2
+CLONE_FREE, CLONE_MOTION, CLONE_LOAD, CLONE_WANDER = 0, 1, 2, 3
+"""What a slot holds: an instant that a late measurement may belong to or, always in slot 0 and only where the
+receiver wanders, the present error of its position, which fades and is not the vehicle's."""
 
 MOST_ROTORS = 16
 COMMAND_HISTORY = 65  # as many as loop.delay_ticks may ask for, and one
@@ -114,6 +116,9 @@ PARAMETERS = np.dtype(
         ("sensor_std", "f8", SENSOR_COUNT),
         ("gps_position_std", "f8", 3),
         ("gps_velocity_std", "f8", 3),
+        ("gps_wander_std", "f8", 3),
+        ("gps_wander_time", "f8"),
+        ("home_altitude", "f8"),
         ("accelerometer_range", "f8"),
         ("gyroscope_range", "f8"),
         ("gate", "f8", SENSOR_COUNT),
@@ -139,7 +144,7 @@ PARAMETERS = np.dtype(
 rest_length, reel_rate: m and m/s, of the cable as the winch has it now; standing_height, lying_height: m,
 world, of vehicle and load at rest on the ground; *_drag: linear (N s/m) and quadratic (N s²/m²); gust_*: of
 white force on the vehicle beside the coloured one, m/s² as an accelerometer sees it and as the velocity feels
-it.
+it; home_altitude: m above mean sea level, what a barometer without error shows at a height of 0.
 """
 
 MEMORY = np.dtype(

@@ -10,6 +10,7 @@ import numpy as np
 from controller.estimator.alignment import align, start_hanging
 from controller.estimator.contact_modes import leave_ground, lose_track, release, stand, watch
 from controller.estimator.correct.delayed import OUTAGE, gps, remember, tracker
+from controller.estimator.correct.receiver_wander import fade_wander
 from controller.estimator.correct.sensors import (
     accelerometer,
     barometer,
@@ -114,6 +115,7 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
     ticks = int((given.time - m.time) / p.period + 0.5)
     for _ in range(min(ticks, MOST_MISSED_TICKS)):
         predict(f)
+        fade_wander(f)
         if m.time > m.next_clone - 0.5 * p.period:
             remember(f, CLONE_MOTION)
             m.next_clone += p.clone_interval if m.align_gps else BLIND_CLONE_TICKS * p.period

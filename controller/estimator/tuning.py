@@ -42,9 +42,13 @@ class Tuning:
     barometer_std: float = 0.3
     """m"""
     gps_position_std: Triple = (0.5, 0.5, 0.8)
-    """m, when the message does not say"""
+    """m, of the white noise, when the message does not say"""
     gps_velocity_std: Triple = (0.1, 0.1, 0.15)
     """m/s, likewise"""
+    gps_wander_std: Triple = (0.0, 0.0, 0.0)
+    """m, of an error of the position that wanders (first-order Gauss-Markov); a state of its own"""
+    gps_wander_time: float = 60.0
+    """s, its time constant"""
     accelerometer_range: float = 16.0 * STANDARD_GRAVITY
     """m/s²; a sample at the limit is not used"""
     gyroscope_range: float = math.radians(2000.0)
@@ -77,6 +81,10 @@ class Tuning:
     """m/s² per sqrt(s)"""
     baro_walk: float = 0.01
     """m per sqrt(s)"""
+    baro_offset_std: float = 3.0
+    """m, at the start"""
+    home_altitude: float = 0.0
+    """m above mean sea level; used where the barometer says the height at the start, and not the receiver"""
     accel_bias_std: float = 0.05
     """m/s², at the start"""
     gyro_bias_std: float = 0.01
@@ -117,6 +125,7 @@ class Receiver(Protocol):
     vertical_velocity_noise: float
     horizontal_wander: float
     vertical_wander: float
+    wander_time: float
 
 
 class Suite(Protocol):
@@ -155,8 +164,7 @@ def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> 
     gyroscope: Instrument = sensors.gyroscope
     barometer: Instrument = sensors.barometer
     gps: Receiver = sensors.gps
-    horizontal = max(0.01, math.hypot(gps.horizontal_noise, gps.horizontal_wander))
-    vertical = max(0.01, math.hypot(gps.vertical_noise, gps.vertical_wander))
+    horizontal, vertical = max(0.01, gps.horizontal_noise), max(0.01, gps.vertical_noise)
     across, up = max(0.01, gps.horizontal_velocity_noise), max(0.01, gps.vertical_velocity_noise)
     plain = Tuning()
     return replace(
@@ -168,6 +176,8 @@ def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> 
         barometer_std=std(barometer, 0.02),
         gps_position_std=(horizontal, horizontal, vertical),
         gps_velocity_std=(across, across, up),
+        gps_wander_std=(gps.horizontal_wander, gps.horizontal_wander, gps.vertical_wander),
+        gps_wander_time=gps.wander_time,
         accelerometer_range=accelerometer.range or plain.accelerometer_range,
         gyroscope_range=gyroscope.range or plain.gyroscope_range,
         field=field,
@@ -176,6 +186,10 @@ def from_sensors(sensors: Suite, rate_hz: float, field: Triple, **more: Any) -> 
         accel_bias_walk=max(5e-5, accelerometer.random_walk),
         gyro_bias_walk=max(2e-6, gyroscope.random_walk),
         baro_walk=max(plain.baro_walk, barometer.random_walk),
+        # Of a receiver that wanders the height is no better known than the barometer's, which then has to do.
+        baro_offset_std=max(0.1, 1.5 * barometer.bias)
+        if gps.vertical_wander > 0.0
+        else plain.baro_offset_std,
         gps_period=1.0 / gps.rate,
         tracker_period=1.0 / sensors.tracker.rate if sensors.tracker is not None else 0.0,
         **more,
@@ -227,6 +241,8 @@ def parameters(vehicle: Vehicle, period: float, tuning: Tuning) -> Any:
     stds[MAGNETOMETER], stds[BAROMETER] = tuning.magnetometer_std, tuning.barometer_std
     p["sensor_std"] = stds
     p["gps_position_std"], p["gps_velocity_std"] = tuning.gps_position_std, tuning.gps_velocity_std
+    p["home_altitude"] = tuning.home_altitude
+    p["gps_wander_std"], p["gps_wander_time"] = tuning.gps_wander_std, tuning.gps_wander_time
     p["accelerometer_range"], p["gyroscope_range"] = tuning.accelerometer_range, tuning.gyroscope_range
     for index, name in GATE_NAMES.items():
         p["gate"][index] = tuning.gates[name]
@@ -296,13 +312,13 @@ def _set_disturbance(p: Any, vehicle: Vehicle, tuning: Tuning) -> None:
 def initial_std(vehicle: Vehicle, tuning: Tuning) -> Any:
     """Standard deviations (34,) of the error state after an alignment at rest."""
     std = np.zeros(ERROR_SIZE)
-    std[PARTS["position"]] = tuning.gps_position_std
+    std[PARTS["position"]] = np.hypot(tuning.gps_position_std, tuning.gps_wander_std)
     std[PARTS["velocity"]] = tuning.gps_velocity_std
     std[PARTS["attitude"]] = (0.02, 0.02, 0.1)
     std[PARTS["rates"]] = 0.02
     std[PARTS["gyro_bias"]] = tuning.gyro_bias_std
     std[PARTS["accel_bias"]] = tuning.accel_bias_std
-    std[PARTS["baro_offset"]] = 3.0
+    std[PARTS["baro_offset"]] = tuning.baro_offset_std
     std[PARTS["load"]] = 0.1 * vehicle.hover_length
     std[PARTS["load_velocity"]] = 0.2
     std[PARTS["force"]] = 0.5

@@ -59,6 +59,7 @@ def tuning_for(vehicle: Vehicle, rate_hz: float) -> Tuning:
         vehicle.sensors,
         rate_hz,
         field_at(vehicle.home),
+        home_altitude=vehicle.home.altitude,
         has_ground=vehicle.ground is not None,
         rotor_time_constant=rotor_time_constant(vehicle),
         estimate_load_wind=vehicle.estimation.load_wind,

@@ -19,6 +19,7 @@ def suite(density: float) -> SimpleNamespace:
         vertical_velocity_noise=0.15,
         horizontal_wander=0.4,
         vertical_wander=0.0,
+        wander_time=40.0,
     )
     names = ("accelerometer", "gyroscope", "magnetometer", "barometer")
     return SimpleNamespace(**dict.fromkeys(names, instrument), gps=gps, tracker=None)
@@ -27,7 +28,8 @@ def suite(density: float) -> SimpleNamespace:
 def test_noise_density_becomes_the_deviation_of_a_sample() -> None:
     tuning = from_sensors(suite(0.01), 400.0, (0.0, 2e-5, -4e-5), has_ground=False)
     assert tuning.accelerometer_std == pytest.approx(0.2)
-    assert tuning.gps_position_std == pytest.approx((0.5, 0.5, 0.8))
+    assert tuning.gps_position_std == pytest.approx((0.3, 0.3, 0.8))
+    assert (tuning.gps_wander_std, tuning.gps_wander_time) == ((0.4, 0.4, 0.0), 40.0)
     assert tuning.gps_period == pytest.approx(0.2)
     assert not tuning.has_ground
 

@@ -133,13 +133,14 @@ def test_three_scalars_one_after_the_other() -> None:
     assert (f.vectors[update.CORRECTION_CLONES, WIDTH:] == 0.0).all()
 
 
-def test_a_remembered_quantity_is_measured() -> None:
+def test_remembered_quantities_and_sums_of_them_are_measured() -> None:
     f = record()
     joint, correction = joint_of(f), np.zeros(ERROR_SIZE + WIDTH)
-    for index, innovation, noise in ((4, 0.7, 0.3), (11, -0.2, 0.05)):
+    for index, also, innovation, noise in ((4, 4, 0.7, 0.3), (11, 11, -0.2, 0.05), (7, 1, 0.4, 0.1)):
         h = np.zeros(ERROR_SIZE + WIDTH)
-        h[ERROR_SIZE + index] = 1.0
-        squared = update.fuse_remembered(f, index, innovation, noise)
+        h[ERROR_SIZE + index] = h[ERROR_SIZE + also] = 1.0
+        assert update.remembered_variance(f, index, also) == pytest.approx(h @ joint @ h)
+        squared = update.fuse_remembered(f, index, also, innovation, noise)
         joint, correction, expected = taken_in(joint, correction, h, innovation, noise)
         assert squared == pytest.approx(expected, rel=1e-9)
         np.testing.assert_allclose(joint_of(f), joint, atol=1e-9)

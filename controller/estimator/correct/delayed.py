@@ -10,8 +10,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from controller.estimator.correct.receiver_wander import WANDER, wanders
 from controller.estimator.correct.sensors import book, judge, passes
-from controller.estimator.correct.update import CORRECTION, begin, fuse_remembered, inject
+from controller.estimator.correct.update import (
+    CORRECTION,
+    begin,
+    fuse_remembered,
+    inject,
+    remembered_variance,
+)
 from controller.estimator.predict.rotation import matrix
 from controller.estimator.records import (
     ATTITUDE,
@@ -21,6 +28,7 @@ from controller.estimator.records import (
     CLONE_MOTION,
     CLONE_ROWS,
     CLONE_SIZE,
+    CLONE_WANDER,
     CLONES,
     ERROR_SIZE,
     FLYING,
@@ -40,8 +48,9 @@ from sitl_bridge.compiled import kernel
 def remember(f: Filter, kind: int) -> int:
     """Remember the present instant; returns its slot (the oldest one gives way)."""
     m, cov = f.m, f.P
-    slot = 0
-    for i in range(CLONES):
+    first = WANDER + 1 if m.clone_kind[WANDER] == CLONE_WANDER else 0
+    slot = first
+    for i in range(first, CLONES):
         if m.clone_kind[i] == CLONE_FREE:
             slot = i
             break
@@ -173,13 +182,17 @@ def gps(f: Filter, given: Any) -> None:
         begin(f)
         for axis in range(3):
             k = base + 3 * half + axis
+            also = CLONE_ROWS * WANDER + axis if wanders(f) and half == 0 else k
             if half == 0:
                 innovation = given.gps_position[axis] - f.z[k] - age * f.z[k + 3]
                 std = given.gps_position_std[axis]
+                if also != k:
+                    innovation -= f.z[also]
             else:
                 innovation = given.gps_velocity[axis] - f.z[k]
                 std = given.gps_velocity_std[axis]
-            worst = max(worst, judge(f, sensor, axis, innovation, f.Pzz[k, k] + std * std))
+            variance = remembered_variance(f, k, also) + std * std
+            worst = max(worst, judge(f, sensor, axis, innovation, variance))
         if not passes(f, sensor, worst):
             continue
         if half == 0:
@@ -187,7 +200,8 @@ def gps(f: Filter, given: Any) -> None:
         for axis in range(3):
             std = given.gps_position_std[axis] if half == 0 else given.gps_velocity_std[axis]
             k = base + 3 * half + axis
-            squares += fuse_remembered(f, k, m.innovation[sensor, axis], std * std)
+            also = CLONE_ROWS * WANDER + axis if wanders(f) and half == 0 else k
+            squares += fuse_remembered(f, k, also, m.innovation[sensor, axis], std * std)
         _slip(f)
         inject(f)
         book(f, sensor, squares, 3)
@@ -261,7 +275,8 @@ def tracker(f: Filter, given: Any) -> None:
     if passes(f, TRACKER, worst):
         for axis in range(3):
             std = given.tracker_std[axis]
-            squares += fuse_remembered(f, base + axis, m.innovation[TRACKER, axis], std * std)
+            k = base + axis
+            squares += fuse_remembered(f, k, k, m.innovation[TRACKER, axis], std * std)
         inject(f)
         book(f, TRACKER, squares, 3)
     forget(f, CLONE_LOAD, given.tracker_time)

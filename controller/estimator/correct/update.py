@@ -119,17 +119,34 @@ def fuse(f: Filter, innovation: float, noise: float) -> float:
 
 
 @kernel
-def fuse_remembered(f: Filter, index: int, innovation: float, noise: float) -> float:
-    """Take in one scalar that measures the remembered quantity `index`; otherwise as `fuse`."""
+def fuse_remembered(f: Filter, index: int, also: int, innovation: float, noise: float) -> float:
+    """Take in one scalar that measures the remembered quantity `index`, plus that with the index `also`.
+
+    also: the same index where there is no other. Otherwise as `fuse`.
+    """
     shared, remembered = f.vectors[SHARED], f.vectors[SHARED_CLONES]
     for i in range(ERROR_SIZE):
         shared[i] = f.Pxz[i, index]
     for k in range(f.m.clone_width):
         remembered[k] = f.Pzz[index, k]
-    variance = f.Pzz[index, index] + noise
     left = innovation - f.vectors[CORRECTION_CLONES, index]
+    if also != index:
+        for i in range(ERROR_SIZE):
+            shared[i] += f.Pxz[i, also]
+        for k in range(f.m.clone_width):
+            remembered[k] += f.Pzz[also, k]
+        left -= f.vectors[CORRECTION_CLONES, also]
+    variance = remembered_variance(f, index, also) + noise
     _apply(f, left, variance)
     return float(left * left / variance)
+
+
+@kernel
+def remembered_variance(f: Filter, index: int, also: int) -> float:
+    """Variance of what `fuse_remembered` measures, without its noise."""
+    if also == index:
+        return float(f.Pzz[index, index])
+    return float(f.Pzz[index, index] + 2.0 * f.Pzz[index, also] + f.Pzz[also, also])
 
 
 @kernel
