@@ -1,4 +1,4 @@
-"""One control step, compiled: estimate -> law -> rotor commands -> memory."""
+"""One control step, compiled: reference -> estimate -> law -> rotor commands -> memory."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.law.adaptation import adapt, give, set_pace
 from controller.law.allocation import ALLOCATION, MOST_ROTORS, allocate
+from controller.law.approach import advance
 from controller.law.control_law import DESIGN, MEMORY, WORK, remember, step
 from controller.law.reference import PATH
 from controller.law.state import STATE_SIZE, Array
@@ -32,11 +33,13 @@ def control_step(
 
     A law that has lost itself (a wrench that is not finite) stops the rotors openly: the commands are NaN.
     """
-    design, memory, work = designs[0], memories[0], works[0]
+    design, path, memory, work = designs[0], paths[0], memories[0], works[0]
+    if path.guide.active:
+        advance(path, memory.ticks * design.period)
     if design.adapts:
         adapt(design, memory, estimate)
-        set_pace(design, memory, paths[0])
-    step(design, memory, paths[0], estimate, work)
+        set_pace(design, memory, path)
+    step(design, memory, path, estimate, work)
     limited = allocate(allocations[0], work.wrench, controls, work.achieved, work.rotors)
     if not math.isfinite(work.wrench[0] + work.wrench[1] + work.wrench[2] + work.wrench[3]):
         for i in range(MOST_ROTORS):

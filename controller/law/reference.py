@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.law.guide import DERIVATIVES as DERIVATIVES
+from controller.law.guide import GUIDE
 from controller.law.state import Array
 from sitl_bridge.compiled import kernel
-
-DERIVATIVES = 5
-"""Derivatives of a feasible path that are continuous, the position's own not counted."""
 
 USUAL_AGILITY = 0.7
 
@@ -47,6 +46,7 @@ PATH = np.dtype(
         ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
         ("epoch", "f8"),  # s, path time of `motion`
         ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
+        ("guide", GUIDE),  # who shapes it, see `approach`
         ("pieces", "i8"),  # of the planned profile, equal shares of the ramp time; 0: it is the smooth step
         (
             "profile",

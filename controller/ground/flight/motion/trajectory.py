@@ -1,11 +1,6 @@
 """Targets of ground control -> a motion that the feed-forward can follow, from any state, moving or not.
 
-The motion is the sum of two: a *base*, which is what the target says by itself (a moving set-point with its
-velocity and acceleration; nothing for a point to go to), and the *gap* to it, which is closed within limits.
-A *carrot* with bounded speed and acceleration closes the gap, and the gap follows it through a chain of five
-integrators (a reference model with all its poles in one place). When the base jumps, gap and carrot jump the
-other way: so whatever a client sends, the motion has the derivatives that a flat output needs, without a
-jump, and a set-point that moves smoothly is followed without a lag.
+The way of it is `controller.law.approach`; this puts targets and limits into its record.
 """
 
 from __future__ import annotations
@@ -17,32 +12,19 @@ import numpy as np
 from scipy import linalg
 
 from controller.ground.flight.motion.setpoint_types import Follow, Goto, Land
-from controller.law.reference import DERIVATIVES, Path, local_path
+from controller.law.approach import BRAKING_SHARE, advance_path, rebase_path
+from controller.law.guide import BASE, DERIVATIVES, LANDING, MOVING, POINT
+from controller.law.reference import Path, local_path
 from controller.law.state import Array
-from sitl_bridge.frames import Triple
 
 FASTEST_POLE = 6.0
 """1/s, of the reference model; five of them: it settles in some 2 s"""
 POLE_SHARE = 8.0
 """Of g over the cable's length, that the pole's square is at most"""
-APPROACH = 1.5
-"""1/s, with which the carrot's last bit of way to a point decays"""
-CLOSING = 5.0
-"""1/s, likewise for the gap to a moving set-point"""
-BRAKING_SHARE = 0.7
-"""Of the acceleration limit, that an approach to a point is planned with"""
-LEAST_CLOSING_SPEED = 0.3
-"""Of the speed limit, that is left to close the gap to a set-point that moves fast itself"""
 MOST_JERK = 5.0
 """m/s³, that is believed of a set-point's accelerations"""
 SHORTEST_INTERVAL = 0.015
 """s between two set-points from which a jerk is taken"""
-COASTING = 0.6
-"""s after which a set-point that has not been renewed goes on without its acceleration"""
-YAW_RATE = 0.6
-"""rad/s, largest"""
-YAW_ACCELERATION = 0.5
-"""rad/s²: yaw is what rotors are worst at"""
 
 
 class Limits(NamedTuple):
@@ -87,10 +69,6 @@ def _feedback(pole: float) -> Array:
     return np.array([math.comb(DERIVATIVES, k) * pole ** (DERIVATIVES - k) for k in range(DERIVATIVES)])
 
 
-_BASE = 4
-"""Position and derivatives of a base"""
-
-
 def _transitions(period: float, feedback: Array) -> tuple[Array, Array]:
     """What a period makes of a motion (5, 3), and what the carrot (3, 3), a parabola in it, adds to that."""
     order = DERIVATIVES
@@ -106,27 +84,23 @@ def _transitions(period: float, feedback: Array) -> tuple[Array, Array]:
 class Trajectory:
     """The reference of one law; `path` (1,) is what the law follows."""
 
-    def __init__(self, period: float, pole: float = FASTEST_POLE) -> None:
-        """period: s, of the law; pole: 1/s, see `motion_pole`."""
+    def __init__(self, period: float, pole: float = FASTEST_POLE, with_the_law: bool = False) -> None:
+        """period: s, of the law; pole: 1/s, see `motion_pole`; with_the_law: the control step goes on with
+        it, and nobody calls `advance`."""
         self.path: Path = local_path()
+        guide = self._guide = self.path[0]["guide"]
         self._pole = pole
-        self._feedback = _feedback(pole)
-        self._ahead = self._feedback[:_BASE] / self._feedback[0]
-        """The carrot that belongs to a motion: c = (1 + D/pole)^5 r"""
-        self._period = period
-        self._motion: Array = self.path["motion"][0]
-        self._own, self._pull = _transitions(period, self._feedback)
-        self._coast = linalg.expm(np.eye(_BASE, k=1) * period)
-        self._base = np.zeros((_BASE, 3))
-        """Position, velocity, acceleration, jerk"""
-        self._gap = np.zeros((DERIVATIVES + 1, 3))
-        self._carrot = np.zeros((3, 3))
-        """Position, velocity, acceleration of the gap's carrot"""
-        self._age = 0.0
-        """s since the target was given"""
+        feedback = _feedback(pole)
+        guide["active"] = with_the_law
+        guide["period"], guide["feedback"], guide["ahead"] = period, feedback, feedback[:BASE] / feedback[0]
+        guide["own"], guide["pull"] = _transitions(period, feedback)
+        guide["coast"] = linalg.expm(np.eye(BASE, k=1) * period)
+        self._base, self._gap, self._carrot = guide["base"], guide["gap"], guide["carrot"]
+        self._asked = np.zeros((BASE, 3))
+        self._rebase = rebase_path.bind(self.path, self._asked)
+        self._advance = advance_path.bind(self.path)
         self._target: Goto | Land | Follow | None = None
-        self._sinking = 0.0
-        """m/s, of `lower`"""
+        self._limits: Limits | None = None
 
     def start(self, position: Array, velocity: Array, yaw: float) -> None:
         """Begin where a body is, with the velocity it has (m, m/s, rad)."""
@@ -135,7 +109,7 @@ class Trajectory:
         self._gap[0], self._gap[1] = position, velocity
         self._carrot[0] = position + DERIVATIVES / self._pole * velocity
         self._carrot[1], self._carrot[2] = velocity, 0.0
-        self._motion[:] = self._gap
+        self.path["motion"][0] = self._gap
         self.path["yaw"], self.path["yaw_rate"] = yaw, 0.0
         self._target = None
 
@@ -143,36 +117,38 @@ class Trajectory:
         """All that was said so far is meant so much lower, m; and it sinks at a speed now, m/s."""
         self._gap[0, 2] -= way
         self._carrot[0, 2] -= way
-        self._sinking = speed
+        self._guide["sinking"] = speed
+
+    def aim(self, target: Goto | Land | Follow, limits: Limits) -> None:
+        """Go to a target within limits, from the next step on."""
+        if limits != self._limits:
+            self._limits = limits
+            self._guide["limits"] = limits
+        if target is not self._target:
+            self._take(target, limits)
 
     def advance(self, target: Goto | Land | Follow, limits: Limits, time: float) -> None:
         """Go on by one period towards a target; `time` (s) is that of the law's step to come."""
-        if target is not self._target:
-            self._take(target, limits)
-        elif self._age > COASTING and self._base[2:].any():
-            self._rebase(np.vstack((self._base[:2], np.zeros((2, 3)))))
-        before = self._carrot.copy()
-        self._move_carrot(target, limits)
-        before[2] = self._carrot[2]
-        gap = self._gap
-        gap[:DERIVATIVES] = self._own @ gap[:DERIVATIVES] + self._pull @ before
-        gap[DERIVATIVES] = self._feedback[0] * self._carrot[0] - self._feedback @ gap[:DERIVATIVES]
-        self._base = self._coast @ self._base
-        self._motion[:] = gap
-        self._motion[:_BASE] += self._base
-        self._motion[1, 2] -= self._sinking
-        self._turn(target)
-        self.path["epoch"] = time
-        self._age += self._period
+        self.aim(target, limits)
+        self._advance(time)
 
     def _take(self, target: Goto | Land | Follow, limits: Limits) -> None:
         """A new target: what it says by itself becomes the base, without a jump of the motion."""
         before, self._target = self._target, target
         if isinstance(target, Follow):
-            self._rebase(self._base_of(target, before, limits))
+            self._asked[:] = self._base_of(target, before, limits)
+            self._rebase()
         elif self._base.any():
-            self._rebase(np.zeros((_BASE, 3)))
-        self._age = 0.0
+            self._asked[:] = 0.0
+            self._rebase()
+        guide = self._guide
+        guide["age"] = 0.0
+        guide["target"], guide["yaw"] = target.position, target.yaw
+        if isinstance(target, Follow):
+            guide["kind"], guide["yaw_rate"] = MOVING, target.yaw_rate
+        else:
+            guide["kind"] = POINT if isinstance(target, Goto) else LANDING
+            guide["speed"] = target.speed
 
     def _base_of(self, target: Follow, before: Goto | Land | Follow | None, limits: Limits) -> Array:
         position = np.array(target.position)
@@ -180,10 +156,11 @@ class Trajectory:
         # On an axis without a position the base may be anywhere: only its velocity counts.
         base[0] = np.where(np.isnan(position), self._base[0], position)
         if isinstance(before, Follow):
-            if self._age < SHORTEST_INTERVAL:
+            age = float(self._guide["age"])
+            if age < SHORTEST_INTERVAL:
                 base[3] = self._base[3]
             else:
-                jerk = (base[2] - before.acceleration) / self._age
+                jerk = (base[2] - before.acceleration) / age
                 base[3] = np.clip(np.nan_to_num(jerk), -MOST_JERK, MOST_JERK)
         base[np.isnan(base)] = 0.0
         size = math.hypot(*base[2].tolist())
@@ -191,82 +168,3 @@ class Trajectory:
             base[2] *= limits.total / size
             base[3] = 0.0
         return base
-
-    def _rebase(self, base: Array) -> None:
-        """Go over to another base; the motion and its derivatives stay as they are."""
-        jump = base - self._base
-        self._base = base
-        self._gap[:_BASE] -= jump
-        self._carrot[0] -= self._ahead @ jump
-        self._carrot[1] -= self._ahead[:-1] @ jump[1:]
-
-    def _move_carrot(self, target: Goto | Land | Follow, limits: Limits) -> None:
-        dt = self._period
-        position, velocity = self._carrot[0].tolist(), self._carrot[1].tolist()
-        wanted = self._wanted(target, limits, position)
-        change = [w - v for w, v in zip(wanted, velocity, strict=True)]
-        wish = _shortened([c / dt for c in change], limits.acceleration)
-        own = self._base[2].tolist()
-        both = _shortened(
-            [w + a for w, a in zip(wish, own, strict=True)], max(limits.total, math.hypot(*own))
-        )
-        for i in range(3):
-            step = dt * (both[i] - own[i])
-            self._carrot[2, i] = step / dt
-            self._carrot[1, i] = velocity[i] + step
-            self._carrot[0, i] = position[i] + dt * (velocity[i] + 0.5 * step)
-
-    def _wanted(self, target: Goto | Land | Follow, limits: Limits, here: list[float]) -> Triple:
-        """Velocity that the carrot is to have now."""
-        braking = BRAKING_SHARE * limits.acceleration
-        if isinstance(target, Follow):
-            x, y, z = (0.0 if math.isnan(p) else -h for p, h in zip(target.position, here, strict=True))
-            own = math.hypot(*self._base[1].tolist())
-            speed = max(limits.speed - own, LEAST_CLOSING_SPEED * limits.speed)
-            return _towards((x, y, z), speed, limits, braking, CLOSING)
-        x, y, z = (p - h for p, h in zip(target.position, here, strict=True))
-        if isinstance(target, Land):
-            x, y, _ = _towards((x, y, 0.0), limits.speed, limits, braking, APPROACH)
-            return (x, y, -target.speed)
-        return _towards((x, y, z), target.speed, limits, braking, APPROACH)
-
-    def _turn(self, target: Goto | Land | Follow) -> None:
-        yaw = float(self.path["yaw"][0])
-        rate = 0.0
-        if not math.isnan(target.yaw):
-            away = math.remainder(target.yaw - yaw, 2.0 * math.pi)
-            rate = math.copysign(_approach(abs(away), BRAKING_SHARE * YAW_ACCELERATION, APPROACH), away)
-            if isinstance(target, Follow) and not math.isnan(target.yaw_rate):
-                rate += target.yaw_rate
-        elif isinstance(target, Follow) and not math.isnan(target.yaw_rate):
-            rate = target.yaw_rate
-        rate = max(-YAW_RATE, min(YAW_RATE, rate))
-        before, step = float(self.path["yaw_rate"][0]), YAW_ACCELERATION * self._period
-        rate = max(before - step, min(before + step, rate))
-        self.path["yaw"] = math.remainder(yaw + rate * self._period, 2.0 * math.pi)
-        self.path["yaw_rate"] = rate
-
-
-def _shortened(vector: list[float], most: float) -> list[float]:
-    """The vector, or the longest of its direction that is allowed."""
-    size = math.hypot(*vector)
-    return vector if size <= most else [x * (most / size) for x in vector]
-
-
-def _approach(away: float, braking: float, decay: float) -> float:
-    """Speed at a distance (m) from the point to stop at: braking as planned, then decaying."""
-    linear = braking / decay**2
-    if away < linear:
-        return decay * away
-    return math.sqrt(2.0 * braking * (away - 0.5 * linear))
-
-
-def _towards(way: Triple, speed: float, limits: Limits, braking: float, decay: float) -> Triple:
-    """Velocity along a way (m) that is left, at most `speed`."""
-    away = math.hypot(*way)
-    if away == 0.0:
-        return (0.0, 0.0, 0.0)
-    vertical = limits.up if way[2] > 0.0 else limits.down
-    speed = min(speed, vertical * away / max(abs(way[2]), 1e-9))
-    share = min(speed, _approach(away, braking, decay)) / away
-    return (way[0] * share, way[1] * share, way[2] * share)
