@@ -14,6 +14,7 @@ from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import AwakeClock
 from controller.pilot.terms_log import TermsLog
+from sitl_bridge.event_log import EventLog
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.links.link import Link
@@ -82,6 +83,8 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
     if options.drop_percent:
         link = LossyLink(link, options.drop_percent, options.seed)
     session = open_session(options, speaker)
+    if options.out is not None:
+        speaker.keep(EventLog(options.out), lambda: session.hil.scenario_time)
     own_law = session.own_law
     flies = f"{options.design} design" if options.law is None else f"law {options.law.name}"
     speaker.say(
@@ -135,7 +138,10 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
     if options.path_from is None:
         from controller.pilot.ground_session import Guided
 
-        guided = Guided(options.vehicle, rate, instance, _ground(options), say, assessor)
+        guided = Guided(
+            *(options.vehicle, rate, instance, _ground(options), say, assessor),
+            on_statustext=lambda text: speaker.note("statustext", text),
+        )
         hil = new_session(guided.autopilot, instance, say, feedback, rate, terms_log)
         return Session(hil, logs, guided, None)
     path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
@@ -221,5 +227,6 @@ def _loop(
             if guided.mode_title != mode:
                 mode = guided.mode_title
                 speaker.event("mode", mode=mode)
+                speaker.note("mode", mode)
             if guided.shut_down:
                 stop.reason = "a client's command to shut down"

@@ -61,7 +61,8 @@ def flying_vehicle(
     stored.write_text(json.dumps({"COM_HIL_LOSS_T": 10.0, **(parameters or {})}))
     command = [sys.executable, "-m", "sitl", "fly", scenario, *arguments]
     command += ["--hil", f"udpout:127.0.0.1:{hil}", "--gcs", f"{gcs}:{gcs_peer}"]
-    command += ["--onboard", f"{onboard}:{onboard_peer}", "--parameters", str(stored), "--out", str(folder)]
+    command += ["--onboard", f"{onboard}:{onboard_peer}", "--parameters", str(stored)]
+    command += ["--out", str(folder), "--no-report"]
     with log.open("wb") as said:
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
         try:

@@ -7,7 +7,10 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any, TextIO
+
+from sitl_bridge.event_log import Event, EventLog, Kind
 
 FLIGHT_OVER = b"over\n"
 """What a parent writes to a child's standard input when there is nothing more to do."""
@@ -45,9 +48,24 @@ class Speaker:
         self._name = name
         self._events = events
         self._stream = stream
+        self._diary: EventLog | None = None
+        self._time_s: Callable[[], float | None] = lambda: None
+
+    def keep(self, diary: EventLog, time_s: Callable[[], float | None]) -> None:
+        """Enter what is said and noted from now on into a diary; time_s: the scenario's time, s."""
+        self._diary, self._time_s = diary, time_s
 
     def say(self, text: str) -> None:
         """One line for a person."""
+        self._show(text)
+        self.note("message", text)
+
+    def note(self, kind: Kind, text: str) -> None:
+        """An entry in the diary, if one is kept."""
+        if self._diary is not None:
+            self._diary.add(Event(self._time_s(), self._name, kind, text))
+
+    def _show(self, text: str) -> None:
         print(f"{self._name}: {text}", file=sys.stderr, flush=True)
 
     def event(self, kind: str, **fields: Any) -> None:

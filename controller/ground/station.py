@@ -6,6 +6,7 @@ No sockets, no clock, no threads. `now` is in seconds of one monotonic clock thr
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -87,8 +88,11 @@ class Station:
         signing: Signing | None = None,
         peers: tuple[Address, ...] | None = None,
         logs: LogStore | None = None,
+        on_statustext: Callable[[str], None] = lambda text: None,
     ) -> None:
+        """on_statustext: told each STATUSTEXT that goes to every peer."""
         self.profile = profile
+        self._on_statustext = on_statustext
         self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
         self.missions = Plans(
@@ -252,6 +256,7 @@ class Station:
     def announce(self, notice: Notice, now: float) -> None:
         """A STATUSTEXT to every peer."""
         self._due = now
+        self._on_statustext(notice.text)
         self._out.announce(notice, now)
 
     # Out

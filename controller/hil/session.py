@@ -17,6 +17,7 @@ from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
 from controller.law.control_law import Law
 from controller.law.state import Array
+from sitl_bridge.frames import MICROSECONDS_PER_SECOND
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, COMPONENT_TRUTH, vehicle_system
 from sitl_bridge.mavlink.framing import Frame, Packer
 from sitl_bridge.mavlink.hil import ODOMETRY
@@ -95,8 +96,17 @@ class HilSession:
         self._out: list[bytes] = []
         self._last_time = 0
         self._last_answer: bytes | None = None
+        self._armed_at: int | None = None
+        """`time_usec` of the first armed answer"""
         self._last_heard: float | None = None
         self._next_request = 0.0
+
+    @property
+    def scenario_time(self) -> float | None:
+        """s since the first armed answer; None before it."""
+        if self._armed_at is None:
+            return None
+        return max(0.0, (self._last_time - self._armed_at) / MICROSECONDS_PER_SECOND)
 
     def next_deadline(self) -> float:
         """When the plant's silence is worth a word."""
@@ -131,6 +141,7 @@ class HilSession:
             if tick.time_usec <= self._last_time:
                 self._say("the plant has started again")
                 self._disarm()
+                self._armed_at = None
                 self._feedback.restart()
                 if self._tick_rate is not None:
                     self._tick_rate.restart()
@@ -164,6 +175,8 @@ class HilSession:
         if estimate is not None and at_our_rate:
             before = self._autopilot.armed
             self._autopilot.step(estimate, time_usec, now)
+            if self._armed_at is None and self._autopilot.armed:
+                self._armed_at = time_usec
             if self._autopilot.armed != before:
                 self._say(
                     "disarmed" if before else f"plant and {self._feedback.name} are there: armed, flying"

@@ -45,9 +45,16 @@ class GroundLink:
     """A station with its sockets open."""
 
     def __init__(
-        self, vehicle: Vehicle, instance: int, options: GroundOptions, say: Callable[[str], None]
+        self,
+        vehicle: Vehicle,
+        instance: int,
+        options: GroundOptions,
+        say: Callable[[str], None],
+        on_statustext: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """Raises OSError when a port is taken, KeyFileError for a key that is none."""
+        """say: takes lines for a person; on_statustext: takes what goes to every ground station.
+
+        Raises OSError when a port is taken, KeyFileError for a key that is none."""
         local, first = local_ports(instance), standard_peers(instance)
         given = (options.stations, options.onboard)
         ports = [
@@ -70,7 +77,7 @@ class GroundLink:
             raise OSError(f"ground control's UDP ports {numbers}: {error.strerror or error}") from None
         profile = profile_of(vehicle, instance, has_ground=vehicle.ground is not None)
         logs = None if options.logs is None else LogFolder(options.logs)
-        self.station = Station(profile, time.monotonic(), storage, signing, peers, logs)
+        self.station = Station(profile, time.monotonic(), storage, signing, peers, logs, on_statustext)
         self._signing = signing
         # Of the parameter file; clients may attach too late for them.
         for notice in self.station.machine.notices:

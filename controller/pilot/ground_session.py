@@ -28,12 +28,15 @@ class Guided:
         options: GroundOptions | None,
         say: Callable[[str], None],
         assessor: Assessor | None = None,
+        on_statustext: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """Raises OSError when a port is taken, KeyFileError for a key that is none."""
+        """on_statustext: takes what goes to every ground station.
+
+        Raises OSError when a port is taken, KeyFileError for a key that is none."""
         self._vehicle = vehicle
         self._assessor = assessor
         self._rate_hz = rate_hz
-        self._link = GroundLink(vehicle, instance, options or GroundOptions(), say)
+        self._link = GroundLink(vehicle, instance, options or GroundOptions(), say, on_statustext)
         self._designer = DesignProcess(vehicle, rate_hz)
         self._packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
         self._pilot: GuidedAutopilot | None = None

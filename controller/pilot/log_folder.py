@@ -8,7 +8,7 @@ from pathlib import Path
 
 from controller.ground.files.logs import LogFile
 
-KINDS = (".parquet", ".tlog", ".ulg", ".mcap", ".json", ".html", ".csv", ".mat", ".png")
+KINDS = (".parquet", ".tlog", ".ulg", ".mcap", ".json", ".jsonl", ".html", ".csv", ".mat", ".png")
 
 
 class LogFolder:

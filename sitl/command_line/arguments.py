@@ -71,6 +71,11 @@ def build_parser() -> argparse.ArgumentParser:
         default="setpoint",
         help="a scenario's name (see below) or .toml file (default: %(default)s)",
     )
+    fly.add_argument(
+        "--no-report",
+        action="store_true",
+        help="leave the logs only: no picture, page or MCAP",
+    )
     fly.epilog = f"Scenarios: {', '.join(_scenario_names())}. Vehicles: {', '.join(vehicle_names())}."
     for add in (_vehicle, _link, _clock, _loop, _control, _seed, _ground, _view, _output):
         add(fly)

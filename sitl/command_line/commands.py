@@ -259,6 +259,7 @@ def _fly(arguments: argparse.Namespace) -> int:
         instance=arguments.instance,
         out=arguments.out,
         logs=arguments.logs,
+        report=not arguments.no_report,
         in_process=arguments.in_process,
         law=law,
     )

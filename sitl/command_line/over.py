@@ -106,10 +106,11 @@ NOT_OVER_A_STACK = {
     "onboard": "--over is the link to the stack",
     "signing_key": "the link to the stack is not signed",
     "parameters": "the stack has the parameters",
+    "no_report": "its flights are always reported",
     "expose": "the stack has the link to ground control",
 }
 """Flags of `fly` that mean nothing here, and why."""
-USUAL: dict[str, Any] = {"in_process": False, "design": "default", "expose": False}
+USUAL: dict[str, Any] = {"in_process": False, "design": "default", "expose": False, "no_report": False}
 
 
 def fly_over_stack(

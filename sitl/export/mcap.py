@@ -15,6 +15,7 @@ import numpy as np
 
 from sitl.recording.recording import Array, Columns, Recording
 from sitl.recording.sensors import SensorLog, read_sensors
+from sitl_bridge.event_log import Event
 from sitl_bridge.frames import LocalOrigin
 from sitl_bridge.log_amount import Logs
 
@@ -39,6 +40,7 @@ def write_mcap(recording: Recording, file: Path, rate_hz: float = RATES_HZ["all"
             writer.columns("/terms", recording.terms)
         if recording.tlog is not None:
             writer.sensors(read_sensors(recording.tlog))
+        writer.events(recording.events)
         writer.outcome()
 
 
@@ -174,6 +176,15 @@ class _FlightWriter:
             for row in _rows(times, self._rate_hz):
                 numbers = {name: _finite(records[name][row]) for name in names}
                 channel.log(numbers, log_time=self._time(float(times[row]))[0])
+
+    def events(self, events: Sequence[Event]) -> None:
+        """What was said and what happened; faults and the plant's own words by their source."""
+        for event in events:
+            log_time, stamp = self._time(event.time_s or 0.0)
+            level = self._m.LogLevel.Warning if event.kind == "fault" else self._m.LogLevel.Info
+            text = f"mode: {event.text}" if event.kind == "mode" else event.text
+            message = self._m.Log(timestamp=stamp, level=level, message=text, name=event.source)
+            self._log.log(message, log_time=log_time)
 
     def outcome(self) -> None:
         """How it ended, in words."""

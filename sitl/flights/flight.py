@@ -68,6 +68,8 @@ class FlightOptions:
     """None: a new folder under runs/; under ground control, no logs."""
     logs: Logs = "usual"
     """How much is left there."""
+    report: bool = True
+    """Whether picture, page and MCAP are made of it."""
     truth_to: tuple[str, int] | None = None
     """Host and port of a viewer that is shown the truth."""
     in_process: bool = False
@@ -267,13 +269,24 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
             outcome = watch(pair, stop, lambda event: display.show(status(event)))
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
-    feedback = options.feedback or usual_feedback(scenario, vehicle)
-    facts = {
+    facts = flight_facts(options, vehicle, outcome)
+    path = path_from(start)
+    estimating = vehicle if estimates(facts["feedback"], vehicle) else None
+    kept = options.logs != "none"
+    summary = write_report(out, facts, path, estimating, vehicle, picture=kept and options.report)
+    if kept:
+        keep_recording(out, vehicle, path, options.logs, options.report)
+    return summary
+
+
+def flight_facts(options: FlightOptions, vehicle: Vehicle, outcome: Outcome) -> dict[str, Any]:
+    """What is known of a flight besides its logs: keys of the summary."""
+    return {
         "scenario": options.scenario_name,
         "vehicle": vehicle.name,
         "design": options.design if options.law is None else None,
         "law": outcome.law,
-        "feedback": feedback,
+        "feedback": options.feedback or usual_feedback(options.scenario, vehicle),
         "seed": options.seed,
         "clock": options.clock,
         "rate_hz": options.rate_hz,
@@ -283,10 +296,3 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
         "first_command_unix_s": outcome.first_command_unix_s,
         **{key: outcome.end[key] for key in OF_THE_PLANT if key in outcome.end},
     }
-    path = path_from(start)
-    estimating = vehicle if estimates(feedback, vehicle) else None
-    kept = options.logs != "none"
-    summary = write_report(out, facts, path, estimating, vehicle, picture=kept)
-    if kept:
-        keep_recording(out, vehicle, path, options.logs)
-    return summary

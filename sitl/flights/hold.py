@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sitl.flights.flight import FlightOptions
-from sitl.flights.launch import Pair, watch
-from sitl.flights.report import clear
+from sitl.flights.flight import FlightOptions, flight_facts
+from sitl.flights.keep import keep_recording
+from sitl.flights.launch import Outcome, Pair, watch
+from sitl.flights.report import clear, write_report
 from sitl.terminal.display import Display
 from sitl.terminal.status import status_of
 from sitl_bridge.process import StopRequest
+from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
@@ -38,11 +42,25 @@ def check_design(design: str) -> None:
 
 def hold(options: FlightOptions, stop: StopRequest) -> str | None:
     """Run both processes until asked to stop; returns what went wrong before that, if something did."""
-    options.checked_vehicle()
+    vehicle = options.checked_vehicle()
     options.check_port()
     if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
         clear(options.out)
     with Display() as display:
         pair = Pair(*options.command_lines(), display.messages)
         outcome = watch(pair, stop, lambda event: display.show(status_of(event)))
-    return None if stop else outcome.failure
+    failure = None if stop else outcome.failure
+    if options.out is not None:
+        _report(options.out, options, vehicle, outcome, failure)
+    return failure
+
+
+def _report(
+    out: Path, options: FlightOptions, vehicle: Vehicle, outcome: Outcome, failure: str | None
+) -> None:
+    """Summary, picture, MCAP and interactive page; of a flight that never began, the summary alone."""
+    ended = replace(outcome, failure=failure, end={**outcome.end, "completed": failure is None})
+    facts = flight_facts(options, vehicle, ended)
+    write_report(out, facts, None, described=vehicle, picture=options.report)
+    keep_recording(out, vehicle, None, options.written, options.report)

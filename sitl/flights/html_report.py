@@ -10,7 +10,7 @@ import gzip
 import html
 import itertools
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -19,20 +19,23 @@ import numpy as np
 
 from controller.law.terms import TERMS
 from sitl.recording.recording import Array, Columns, Recording
+from sitl_bridge.event_log import FILE_NAME as EVENTS_NAME
+from sitl_bridge.event_log import Event
 
 FILE_NAME = "flight.html"
+MOST_MARKS = 100
+MOST_EVENTS = 500
+"""Rows of the diary on the page."""
 MOST_POINTS = 1500
 """Of a line; between them the smallest and largest value of each stretch are kept."""
 LOAD = 3
 """Row of the load's position in the covariance of the estimate."""
 _COLOURS = {"x": "#d62728", "y": "#2ca02c", "z": "#1f77b4"}
-_PANELS = (
-    "load and set-point [m]",
-    "load's distance from its set-point [m]",
-    "swing and tilt [°]",
-    "cable tension [N]",
-    "rotors, share of the largest speed",
-)
+LOAD_PANEL = "load and set-point [m]"
+DISTANCE = "load's distance from its set-point [m]"
+ANGLES = "swing and tilt [°]"
+TENSION = "cable tension [N]"
+ROTORS = "rotors, share of the largest speed"
 _TERM_PANELS = {
     "thrust, term by term [N]": {"": "thrust_N"},
     "moments, term by term [N m]": {" about x": "moment_x_N_m", " about y": "moment_y_N_m"},
@@ -46,7 +49,7 @@ _TERM_COLOURS = dict(zip(TERMS, ("#7f7f7f", "#1f77b4", "#2ca02c", "#9467bd", "#d
 def write_html(recording: Recording, file: Path) -> None:
     """Write the report of a flight."""
     figure = _figure(recording)
-    file.write_text(_page(recording.summary, figure), encoding="utf-8")
+    file.write_text(_page(recording.summary, figure, recording.events), encoding="utf-8")
 
 
 def envelope(times: Array, values: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
@@ -94,9 +97,11 @@ def _figure(recording: Recording) -> dict[str, Any]:
     times, states = recording.times, recording.states
     load = recording.vectors("load_{}_m")
     traces: list[dict[str, Any]] = []
+    panels = _panels(recording)
 
-    def line(panel: int, name: str, values: Array, **style: Any) -> None:
+    def line(title: str, name: str, values: Array, **style: Any) -> None:
         x, y = envelope(times, values)
+        panel = panels.index(title) + 1
         axis = "" if panel == 1 else str(panel)
         rounded = ([float(f"{v:.6g}") for v in column] for column in (x.tolist(), y.tolist()))
         trace = dict(zip("xy", rounded, strict=True)) | {"name": name, "type": "scatter", "mode": "lines"}
@@ -104,32 +109,37 @@ def _figure(recording: Recording) -> dict[str, Any]:
 
     for index, letter in enumerate("xyz"):
         colour = _COLOURS[letter]
-        line(1, f"{letter} of the load", load[:, index], line={"color": colour})
+        line(LOAD_PANEL, f"{letter} of the load", load[:, index], line={"color": colour})
         dashed = {"color": colour, "dash": "dash", "width": 1}
-        line(1, f"{letter} of the set-point", recording.reference[:, index], line=dashed)
+        if DISTANCE in panels:
+            line(LOAD_PANEL, f"{letter} of the set-point", recording.reference[:, index], line=dashed)
         _add_band(traces, recording, letter, colour)
-    line(2, "distance", np.linalg.norm(load - recording.reference, axis=1))
-    line(3, "swing of the load", swing_deg(recording))
-    line(3, "tilt of the vehicle", tilt_deg(recording))
-    line(4, "tension", states["cable_tension_N"])
+    if DISTANCE in panels:
+        line(DISTANCE, "distance", np.linalg.norm(load - recording.reference, axis=1))
+    line(ANGLES, "swing of the load", swing_deg(recording))
+    line(ANGLES, "tilt of the vehicle", tilt_deg(recording))
+    line(TENSION, "tension", states["cable_tension_N"])
     controls = recording.controls()
     for rotor in range(controls.shape[1]):
-        line(5, f"rotor {rotor + 1}", controls[:, rotor], line={"width": 1})
-    _add_terms(traces, recording)
-    return {"data": traces, "layout": _layout(recording)}
+        line(ROTORS, f"rotor {rotor + 1}", controls[:, rotor], line={"width": 1})
+    _add_terms(traces, recording, panels)
+    return {"data": traces, "layout": _layout(recording, panels)}
 
 
-def _titles(recording: Recording) -> list[str]:
-    """Of the panels from the top."""
-    return [*_PANELS, *(_TERM_PANELS if recording.terms is not None else ())]
+def _panels(recording: Recording) -> list[str]:
+    """Titles from the top; without a reference there is no distance from it."""
+    distance = [DISTANCE] if np.isfinite(recording.reference).all() else []
+    terms = _TERM_PANELS if recording.terms is not None else ()
+    return [LOAD_PANEL, *distance, ANGLES, TENSION, ROTORS, *terms]
 
 
-def _add_terms(traces: list[dict[str, Any]], recording: Recording) -> None:
+def _add_terms(traces: list[dict[str, Any]], recording: Recording, panels: Sequence[str]) -> None:
     """What the law's commands were made of; terms that were 0 all the time are left out."""
     log = recording.terms
     if log is None:
         return
-    for panel, (_, parts) in enumerate(_TERM_PANELS.items(), len(_PANELS) + 1):
+    for title, parts in _TERM_PANELS.items():
+        panel = panels.index(title) + 1
         for (about, part), term in itertools.product(parts.items(), TERMS):
             if not log[f"{term}_{part}"].any():
                 continue
@@ -167,24 +177,24 @@ def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, c
     traces.append({**edge, "y": (middle + deviations).tolist(), **band})
 
 
-def _layout(recording: Recording) -> dict[str, Any]:
+def _layout(recording: Recording, panels: Sequence[str]) -> dict[str, Any]:
     """Panels below each other on one time axis; slack stretches shaded."""
     gap = 0.03
-    titles = _titles(recording)
-    height = (1.0 - gap * (len(titles) - 1)) / len(titles)
+    height = (1.0 - gap * (len(panels) - 1)) / len(panels)
     layout: dict[str, Any] = {
-        "height": 230 * len(titles),
-        "margin": {"l": 70, "r": 20, "t": 20, "b": 50},
+        "height": 230 * len(panels),
+        "margin": {"l": 70, "r": 20, "t": 60, "b": 50},
         "hovermode": "x unified",
         "legend": {"traceorder": "grouped"},
         "template": "plotly_white",
-        "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(titles)}"},
+        "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(panels)}"},
         "shapes": [
             *_shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
-            _limit(len(_PANELS)),
+            _limit(panels.index(ROTORS) + 1),
+            *(_mark(event) for event in marked_events(recording.events)),
         ],
     }
-    for index, title in enumerate(titles):
+    for index, title in enumerate(panels):
         top = 1.0 - index * (height + gap)
         axis = {"domain": [top - height, top], "title": {"text": title}}
         layout["yaxis" if index == 0 else f"yaxis{index + 1}"] = axis
@@ -206,6 +216,20 @@ def _shading(spans: Iterable[tuple[float, float]]) -> list[dict[str, Any]]:
         }
         for start, stop in list(spans)[:200]
     ]
+
+
+def marked_events(events: Sequence[Event], most: int = MOST_MARKS) -> list[Event]:
+    """Modes and faults, which get a line in the panels; those before the scenario began have no place."""
+    return [e for e in events if e.kind in ("mode", "fault") and e.time_s is not None][:most]
+
+
+def _mark(event: Event) -> dict[str, Any]:
+    colour = "#c0392b" if event.kind == "fault" else "#8e44ad"
+    across = {"type": "line", "xref": "x", "yref": "paper", "y0": 0, "y1": 1}
+    font = {"size": 10, "color": colour}
+    label = {"text": event.text, "textangle": -90, "textposition": "end", "font": font}
+    line = {"color": colour, "width": 1, "dash": "dot"}
+    return {**across, "x0": event.time_s, "x1": event.time_s, "line": line, "label": label}
 
 
 def _limit(panel: int) -> dict[str, Any]:
@@ -243,14 +267,31 @@ def _facts(summary: dict[str, Any]) -> str:
     return "\n".join(rows)
 
 
-def _page(summary: dict[str, Any], figure: dict[str, Any]) -> str:
+def _events(events: Sequence[Event]) -> str:
+    """The diary as a table's rows."""
+    rows = []
+    for event in events[:MOST_EVENTS]:
+        time = "" if event.time_s is None else f"{event.time_s:.2f} s"
+        cells = (time, event.source, event.kind, event.text)
+        rows.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
+    if len(events) > MOST_EVENTS:
+        rows.append(f"<tr><td colspan=4>and {len(events) - MOST_EVENTS} more, in {EVENTS_NAME}</td></tr>")
+    return "\n".join(rows)
+
+
+def _page(summary: dict[str, Any], figure: dict[str, Any], events: Sequence[Event]) -> str:
     script = (resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes()
     title = html.escape(f"{summary.get('scenario')}: {summary.get('vehicle')}")
     data = json.dumps(figure, allow_nan=False)
     facts = _facts(summary)
     outcome = html.escape(said(summary))
     return _TEMPLATE.format(
-        title=title, said=outcome, facts=facts, script=_packed(script), data=_packed(data.encode())
+        title=title,
+        said=outcome,
+        events=_events(events),
+        facts=facts,
+        script=_packed(script),
+        data=_packed(data.encode()),
     )
 
 
@@ -267,15 +308,22 @@ _TEMPLATE = """<!doctype html>
 <style>
 body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2em auto; max-width: 1150px; padding: 0 1em; }}
 table {{ border-collapse: collapse; font-size: 13px; columns: 2; }}
+table.events {{ columns: 1; }}
+td {{ padding-right: 1.5em; vertical-align: top; }}
 th {{ text-align: left; font-weight: 500; padding-right: 1.5em; }}
 </style>
 </head>
 <body>
 <h1>{title}</h1>
 <p>{said}</p>
-<p>Grey stretches: the cable is slack. Dashed beside the rotors: their largest speed.
+<p>Grey stretches: the cable is slack. Dotted across: flight modes and faults.
+Dashed beside the rotors' speeds: the largest.
 Click a name to hide its line, drag to zoom, double-click to go back.</p>
 <div id="figure"></div>
+<details open><summary>What happened, and what was said</summary><table class="events">
+<tr><th>time</th><th>by</th><th>kind</th><th></th></tr>
+{events}
+</table></details>
 <details><summary>All figures of the flight</summary><table>
 {facts}
 </table></details>

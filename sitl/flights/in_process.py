@@ -19,6 +19,7 @@ from controller.feedback.truth import PathFrom
 from controller.own_law.find import ChosenLaw
 from controller.own_law.interface import LawError
 from controller.run import ControllerOptions, Session, open_session
+from sitl_bridge.event_log import EventLog
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
@@ -132,7 +133,8 @@ def fly_in_process(
     person; by default they are only kept.
     """
     said: list[str] = []
-    speaker = _Collector(said.append if say is None else say)
+    take = said.append if say is None else say
+    plant, controller = _Collector("plant", take), _Collector("controller", take)
     began: list[float] = []
     simulation = Simulation(
         flight.flown,
@@ -143,6 +145,7 @@ def fly_in_process(
         on_begin=lambda: began.extend((time.monotonic(), time.time())),
         faults=flight.faults,
         end_when_lost=True,
+        on_fault=lambda text: plant.note("fault", text),
     )
     recorder: StateLog | MemoryLog
     tlog = None
@@ -153,8 +156,12 @@ def fly_in_process(
         recorder = StateLog(flight.out / FILE_NAME, simulation.world)
         tlog = TlogWriter(flight.out / TLOG_NAME, RECORDED_HZ[flight.logs])
     simulation.record_with(recorder)
-    session = open_session(_controller_options(flight), speaker)
-    clock = Lockstep(simulation, Notices(speaker.say), flight.instance)
+    session = open_session(_controller_options(flight), controller)
+    clock = Lockstep(simulation, Notices(plant.say), flight.instance)
+    if flight.out is not None:
+        diary = EventLog(flight.out)
+        plant.keep(diary, lambda: simulation.scenario_time if simulation.started else None)
+        controller.keep(diary, lambda: session.hil.scenario_time)
     failure = None
     try:
         _loop(clock, session, tlog, stop, lambda: show(_progress(simulation, began)))
@@ -213,12 +220,11 @@ def _loop(
 class _Collector(Speaker):
     """Takes the lines that plant and controller say."""
 
-    def __init__(self, take: Callable[[str], None]) -> None:
-        super().__init__("", events=False)
+    def __init__(self, name: str, take: Callable[[str], None]) -> None:
+        super().__init__(name, events=False)
         self._take = take
 
-    def say(self, text: str) -> None:
-        """Keep a line."""
+    def _show(self, text: str) -> None:
         self._take(text)
 
 

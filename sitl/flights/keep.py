@@ -28,10 +28,13 @@ REFERENCE_EVERY = 5
 """Ticks between two rows of the reference that is kept."""
 
 
-def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath, logs: Logs = "usual") -> None:
+def keep_recording(
+    out: Path, vehicle: Vehicle, path: ReferencePath | None, logs: Logs = "usual", report: bool = True
+) -> None:
     """Write what a flight leaves for other tools; nothing where its state log is not complete.
 
-    vehicle: as the controller was told; path: the reference that was flown; logs: how much.
+    vehicle: as the controller was told; path: the reference that was flown, None: ground control's; logs:
+    how much; report: whether to make MCAP and page.
     """
     try:
         times = read_columns(out / STATES_NAME)["time_s"]
@@ -40,8 +43,10 @@ def keep_recording(out: Path, vehicle: Vehicle, path: ReferencePath, logs: Logs 
     if len(times) < 2:
         return
     write_vehicle(out, vehicle)
-    kept = np.unique(np.append(times[::REFERENCE_EVERY], times[-1]))
-    write_reference(out, kept, reference_positions(path, kept))
+    kept = np.unique(np.append(times[::REFERENCE_EVERY], times[-1])) if path is not None else np.zeros(0)
+    write_reference(out, kept, np.zeros((0, 3)) if path is None else reference_positions(path, kept))
+    if not report:
+        return
     recording = read_recording(out)
     write_mcap(recording, out / MCAP_NAME, MCAP_HZ[logs])
     write_html(recording, out / HTML_NAME)

@@ -26,8 +26,8 @@ class Outcome(NamedTuple):
     """How a flight ended."""
 
     outcome: str
-    """`settled`, `did not settle`, `turned over`, `hit the ground`, `ran away`, `diverged`, `interrupted` or
-    `failed`."""
+    """`settled`, `did not settle`, `turned over`, `hit the ground`, `ran away`, `diverged`, `interrupted`,
+    `failed`, or, under ground control, `ended`."""
     outcome_time_s: float | None
     """When, s of the scenario; None where there is no such instant."""
     outcome_cause: str | None
@@ -40,12 +40,12 @@ UNKNOWN = Outcome("failed", None, None)
 
 
 def judge(
-    states: Mapping[str, Array], reference: Array, vehicle: Vehicle, facts: Mapping[str, Any]
+    states: Mapping[str, Array], reference: Array | None, vehicle: Vehicle, facts: Mapping[str, Any]
 ) -> Outcome:
     """The outcome of a flight.
 
-    states: columns of the state log; reference: (n, 3), m; facts: `completed`, `failure`, `settled`, and the
-    metrics.
+    states: columns of the state log; reference: (n, 3), m, None under ground control, which may land and go
+    where it likes; facts: `completed`, `failure`, `settled`, and the metrics.
     """
     lost = _lost(states, reference, vehicle)
     if lost is not None:
@@ -56,6 +56,8 @@ def judge(
         return Outcome("interrupted" if stopped else "failed", float(states["time_s"][-1]), str(failure))
     if facts.get("settled"):
         return Outcome("settled", facts.get("settling_time_2pct_s"), None)
+    if reference is None:
+        return Outcome("ended", float(states["time_s"][-1]), None)
     return Outcome("did not settle", None, _why_unsettled(facts))
 
 
@@ -68,15 +70,22 @@ def _why_unsettled(facts: Mapping[str, Any]) -> str | None:
     return f"within {allowed:.2f} m at the end, but not for the last {SETTLED_WINDOW:g} s"
 
 
-def _lost(states: Mapping[str, Array], reference: Array, vehicle: Vehicle) -> Outcome | None:
+def _lost(states: Mapping[str, Array], reference: Array | None, vehicle: Vehicle) -> Outcome | None:
     """The first thing after which a vehicle is lost; None: it is not."""
     times = states["time_s"]
     found = [
         ("diverged", _first(~np.isfinite(states["vehicle_x_m"] + states["load_x_m"])), "not finite any more"),
         ("turned over", _first(_tilt(states) > TURNED_OVER), "tilted by more than 90 degrees"),
-        ("hit the ground", _first(_touches(states, vehicle)), "the vehicle touched the ground in flight"),
-        ("ran away", _first(_far(states, reference)), f"the load was over {RUN_AWAY:g} m from its set-point"),
     ]
+    if reference is not None:
+        found += [
+            ("hit the ground", _first(_touches(states, vehicle)), "the vehicle touched the ground in flight"),
+            (
+                "ran away",
+                _first(_far(states, reference)),
+                f"the load was over {RUN_AWAY:g} m from its set-point",
+            ),
+        ]
     happened = [(row, outcome, cause) for outcome, row, cause in found if row is not None]
     if not happened:
         return None

@@ -21,6 +21,7 @@ from sitl.flights.outcome import judge
 from sitl.flights.sensing_error import sensing_error
 from sitl.json_values import plain
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
+from sitl_bridge.event_log import FILE_NAME as EVENTS_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.account import Account
 from sitl_bridge.plant.log.state_log import FILE_NAME
@@ -39,6 +40,7 @@ FILES = (
     REFERENCE_NAME,
     MCAP_NAME,
     HTML_NAME,
+    EVENTS_NAME,
 )
 """Names of everything that a flight leaves in its folder."""
 OF_THE_PLANT = tuple(
@@ -99,27 +101,27 @@ def write_report(
 ) -> dict[str, Any]:
     """Write summary.json and the picture next to the state log; returns the summary.
 
-    facts: what is known besides the log; path: the reference, None when nothing has flown; vehicle: as the
-    controller was told, where it has left a log of its estimate; described: as it was told in any case;
-    picture: whether to draw one.
+    facts: what is known besides the log; path: the reference, None under ground control or when nothing has
+    flown; vehicle: as the controller was told, where it has left a log of its estimate; described: as it was
+    told in any case; picture: whether to draw one.
     """
     state_log = out / FILE_NAME
     summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
-    if path is not None and state_log.exists():
+    if state_log.exists():
         try:
             log = read_state_log(state_log)
         except ValueError as error:
             summary["failure"] = f"{facts.get('failure')}; {error}"
             log = {"time_s": np.zeros(0)}
         if len(log["time_s"]) > 1:
-            reference = reference_positions(path, log["time_s"])
-            seen = 0.0 if described is None else sensing_error(described.sensors, facts["feedback"])
-            metrics = flight_metrics(log["time_s"], positions(log, "load"), reference, seen)
-            summary |= metrics
+            reference = None if path is None else reference_positions(path, log["time_s"])
+            if reference is not None:
+                seen = 0.0 if described is None else sensing_error(described.sensors, facts["feedback"])
+                summary |= flight_metrics(log["time_s"], positions(log, "load"), reference, seen)
             summary["settled"] = bool(summary["settled"] and facts.get("completed"))
             if described is not None:
                 summary |= judge(log, reference, described, summary)._asdict()
-            if vehicle is not None and (out / ESTIMATE_NAME).exists():
+            if vehicle is not None and reference is not None and (out / ESTIMATE_NAME).exists():
                 summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
             if picture:
                 draw(out / PICTURE_NAME, log, reference, facts)
@@ -171,7 +173,7 @@ _SHADES = 64
 """Of the picture: lines in few colours take a quarter of the size that true colours do."""
 
 
-def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, Any]) -> None:
+def draw(file: Path, log: Log, reference: NDArray[np.float64] | None, facts: dict[str, Any]) -> None:
     """Picture of a flight: load and vehicle against the reference, cable length, rotor speeds."""
     import matplotlib
 
@@ -184,7 +186,8 @@ def draw(file: Path, log: Log, reference: NDArray[np.float64], facts: dict[str, 
     figure, axes = plt.subplots(5, 1, figsize=(9, 11), sharex=True, layout="constrained")
     for index, axis in enumerate("xyz"):
         ax = axes[index]
-        ax.plot(time, reference[:, index], "k--", lw=1.2, label="reference (load)")
+        if reference is not None:
+            ax.plot(time, reference[:, index], "k--", lw=1.2, label="reference (load)")
         ax.plot(time, load[:, index], color="tab:orange", lw=1.8, label="load")
         ax.plot(time, vehicle[:, index], color="tab:blue", lw=1.2, label="vehicle")
         ax.set_ylabel(f"{axis} [m]")

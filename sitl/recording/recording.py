@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
+from sitl_bridge.event_log import Event, read_events
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.state_log import FILE_NAME as STATES_NAME
 from sitl_bridge.vehicle.description import Vehicle
@@ -41,13 +42,15 @@ class Recording:
     states: Columns
     """Columns of the state log, each (n,); see `plant.log.rows.columns`."""
     reference: Array
-    """(n, 3), m: where the load was to be at each row, as it was set."""
+    """(n, 3), m: where the load was to be at each row, as it was set; NaN under ground control."""
     estimates: Columns | None
     """Columns of the estimate's log on its own rows; None: there is none."""
     covariance: Columns | None = None
     """Likewise of its covariance."""
     terms: Columns | None = None
     """Likewise of what the law's commands were made of; None: its law told none."""
+    events: Sequence[Event] = ()
+    """What was said and what happened, in order of time."""
 
     @property
     def times(self) -> Array:
@@ -83,7 +86,7 @@ def write_vehicle(folder: Path, vehicle: Vehicle) -> None:
 
 
 def write_reference(folder: Path, times: Array, positions: Array) -> None:
-    """Keep the reference: times (n,) in s, positions (n, 3) in m, world."""
+    """Keep the reference: times (n,) in s, positions (n, 3) in m, world; no rows under ground control."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -114,9 +117,10 @@ def read_recording(folder: Path) -> Recording:
     if not len(states["time_s"]):
         raise RecordingError(f"{folder / STATES_NAME}: no rows; the flight never began")
     reference = read_columns(folder / REFERENCE_NAME)
-    set_points = [
-        np.interp(states["time_s"], reference["time_s"], reference[name]) for name in REFERENCE_COLUMNS[1:]
-    ]
+    set_points = np.full((len(states["time_s"]), 3), np.nan)
+    if len(reference["time_s"]):
+        for column, name in zip(set_points.T, REFERENCE_COLUMNS[1:], strict=True):
+            column[:] = np.interp(states["time_s"], reference["time_s"], reference[name])
     logs = (folder / name for name in (ESTIMATE_NAME, COVARIANCE_NAME, TERMS_NAME))
     estimates, covariance, terms = (read_columns(file) if file.exists() else None for file in logs)
     return Recording(
@@ -124,10 +128,11 @@ def read_recording(folder: Path) -> Recording:
         _summary(folder),
         read_vehicle(folder / VEHICLE_NAME),
         states,
-        np.stack(set_points, axis=1),
+        set_points,
         estimates,
         covariance,
         terms,
+        read_events(folder),
     )
 
 

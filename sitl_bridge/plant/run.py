@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from sitl_bridge.event_log import EventLog
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.links.link import Link
@@ -122,12 +123,13 @@ def run(options: PlantOptions, speaker: Speaker, stop: StopRequest) -> Account:
         on_begin=lambda: progress.begin(simulation.time_usec),
         faults=options.faults,
         end_when_lost=options.end_when_lost,
+        on_fault=lambda text: speaker.note("fault", text),
     )
     punctual = options.clock == "realtime" or bool(options.faults.link)
     link = open_link(options.hil, speaker.say, punctual)
     log, tlog = None, None
     if options.out is not None:  # behind the link: a port in use leaves no empty logs
-        options.out.mkdir(parents=True, exist_ok=True)
+        speaker.keep(EventLog(options.out), lambda: simulation.scenario_time if simulation.started else None)
         log = StateLog(options.out / FILE_NAME, simulation.world)
         simulation.record_with(log)
         tlog = TlogWriter(options.out / TLOG_NAME, RECORDED_HZ[options.logs])

@@ -79,8 +79,12 @@ class Simulation:
         on_begin: Callable[[], None] = lambda: None,
         faults: Faults = NO_FAULTS,
         end_when_lost: bool = False,
+        on_fault: Callable[[str], None] = lambda text: None,
     ) -> None:
-        """end_when_lost: end the scenario a few seconds after the vehicle turned over, fell or ran away."""
+        """end_when_lost: end the scenario a few seconds after the vehicle turned over, fell or ran away.
+
+        on_fault: told in words what begins to fail, or works again.
+        """
         self.rate_hz = rate_hz
         self.period = 1.0 / rate_hz
         self.world = World(with_gusts(vehicle, faults), rate_hz, seed, lightest_load(faults))
@@ -100,6 +104,7 @@ class Simulation:
         self._vehicle = vehicle
         self._delay = LoopDelay(vehicle.loop.delay_ticks)
         self._on_begin = on_begin
+        self._on_fault = on_fault
         self._truth = False
         self._heard = False
         home = vehicle.home
@@ -332,7 +337,8 @@ class Simulation:
         return EVER if self._power is None else interval_ticks_left(self._battery_every, self.ticks_flown)
 
     def _apply_faults(self) -> None:
-        self._faults.apply(self.world, self.ticks_flown)
+        for action in self._faults.apply(self.world, self.ticks_flown):
+            self._on_fault(str(action))
 
     def _fault_ticks_left(self) -> int:
         left = self._faults.ticks_left(self.ticks_flown)
@@ -372,6 +378,8 @@ class Simulation:
         if command.command == common.MAV_CMD_INJECT_FAILURE:
             actions = from_command(command.param1, command.param2, command.param3, len(self._vehicle.rotors))
             self._inject(actions or ())
+            for action in actions or ():
+                self._on_fault(str(action))
             result = common.MAV_RESULT_UNSUPPORTED if actions is None else result
         elif command.command == common.MAV_CMD_SET_MESSAGE_INTERVAL and command.param1 == ODOMETRY.message_id:
             self.ask_for_truth(command.param2 >= 0)

@@ -13,8 +13,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.flights.html_report import envelope, said, slack_spans, swing_deg, tilt_deg, two_sigma, write_html
-from sitl.recording.recording import read_recording
+from sitl.flights.html_report import (
+    DISTANCE,
+    envelope,
+    marked_events,
+    said,
+    slack_spans,
+    swing_deg,
+    tilt_deg,
+    two_sigma,
+    write_html,
+)
+from sitl.recording.recording import read_recording, write_reference
+from sitl_bridge.event_log import Event, EventLog
 from tests.sitl.export.flights import leave_flight
 
 
@@ -58,6 +69,34 @@ def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -
     assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
     assert set(traces["saturated about y"]["y"]) == {18.0}
     assert "feedforward" not in traces  # 0 all the time
+
+
+def test_modes_and_faults_are_marked_and_everything_is_listed(tmp_path: Path) -> None:
+    leave_flight(tmp_path, rows=3)
+    diary = EventLog(tmp_path)
+    diary.add(Event(None, "controller", "mode", "disarmed"))
+    diary.add(Event(0.25, "plant", "fault", "gps is lost"))
+    diary.add(Event(0.5, "controller", "mode", "Land"))
+    diary.add(Event(0.75, "controller", "statustext", "<b>Landing</b>"))
+    recording = read_recording(tmp_path)
+    assert [event.text for event in marked_events(recording.events)] == ["gps is lost", "Land"]
+    write_html(recording, tmp_path / "flight.html")
+    text = (tmp_path / "flight.html").read_text(encoding="utf-8")
+    rows = re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td><td>(.*?)</td></tr>", text)
+    assert [row[3] for row in rows] == ["disarmed", "gps is lost", "Land", "&lt;b&gt;Landing&lt;/b&gt;"]
+    assert rows[1][0] == "0.25 s"
+
+
+def test_without_a_reference_there_is_no_distance_from_it(tmp_path: Path) -> None:
+    leave_flight(tmp_path, rows=3)
+    write_reference(tmp_path, np.zeros(0), np.zeros((0, 3)))
+    write_html(read_recording(tmp_path), tmp_path / "flight.html")
+    data = re.search(r'id="data">(.*?)</script>', (tmp_path / "flight.html").read_text("utf-8"), re.DOTALL)
+    assert data is not None
+    figure = json.loads(gzip.decompress(base64.b64decode(data[1])))
+    titles = {axis["title"]["text"] for name, axis in figure["layout"].items() if name.startswith("yaxis")}
+    assert DISTANCE not in titles
+    assert not any("set-point" in trace["name"] for trace in figure["data"])
 
 
 def test_the_band_is_two_standard_deviations_of_the_loads_position() -> None:

@@ -14,6 +14,7 @@ import pytest
 import sitl
 from sitl.flights.free_ports import free_ports
 from sitl.flights.scenario import Scenario, Setpoint
+from sitl_bridge.event_log import read_events
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 from tests.patience import LONG_PATIENCE, PATIENCE
 from tests.sitl.test_scenarios import FLOWN
@@ -31,6 +32,7 @@ def fly(tmp_path: Path, scenario: str, *more: str) -> dict[str, object]:
         "--seed",
         "5",
         "--json",
+        "--no-report",
         "--duration",
         "6",
         *more,
@@ -49,6 +51,11 @@ def test_the_state_log_is_that_of_two_processes(scenario: str, tmp_path: Path) -
     assert here["completed"]
     assert here["state_log_sha256"] == apart["state_log_sha256"]
     assert here.keys() == apart.keys()
+    faults = [
+        [event for event in read_events(tmp_path / name) if event.kind == "fault"]
+        for name in ("here", "apart")
+    ]
+    assert faults[0] == faults[1]
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,15 @@ from sitl_bridge.vehicle.description import Gust, Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 from sitl_bridge.vehicle.schema import Section, quantity
 
+DOING = {
+    WORKS: "works again",
+    OFF: "is off",
+    STUCK: "is stuck",
+    GARBAGE: "reads garbage",
+    WRONG: "is wrong",
+    LOST: "is lost",
+}
+"""What a sensor does, in words."""
 FAILURES = {"off": OFF, "stuck": STUCK, "garbage": GARBAGE, "wrong": WRONG, "lost": LOST}
 
 
@@ -96,6 +105,9 @@ class SetSensor(NamedTuple):
     sensor: str
     doing: int
 
+    def __str__(self) -> str:
+        return f"{self.sensor} {DOING[self.doing]}"
+
     def apply(self, to: Faulty) -> None:
         """Let it happen."""
         to.set_sensor(self.sensor, self.doing)
@@ -107,6 +119,9 @@ class SetRotor(NamedTuple):
     rotor: int
     thrust: float
 
+    def __str__(self) -> str:
+        return f"rotor {self.rotor + 1} has {100.0 * self.thrust:g} % of its thrust"
+
     def apply(self, to: Faulty) -> None:
         """Let it happen."""
         to.set_rotor(self.rotor, self.thrust)
@@ -114,6 +129,9 @@ class SetRotor(NamedTuple):
 
 class ReleaseCable(NamedTuple):
     """The cable snaps or lets go."""
+
+    def __str__(self) -> str:
+        return "the cable lets go of the load"
 
     def apply(self, to: Faulty) -> None:
         """Let it happen."""
@@ -124,6 +142,9 @@ class SetLoadMass(NamedTuple):
     """The load has this mass, kg; None: as described."""
 
     mass: float | None
+
+    def __str__(self) -> str:
+        return "the load has its own mass again" if self.mass is None else f"the load weighs {self.mass:g} kg"
 
     def apply(self, to: Faulty) -> None:
         """Let it happen."""

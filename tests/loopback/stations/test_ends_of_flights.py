@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 from pymavlink.dialects.v20 import common as mavlink
 
+from sitl.recording.recording import read_recording
 from sitl.testing import flying_vehicle
+from sitl_bridge.event_log import read_events
 from tests.loopback import swing
 from tests.loopback.clients import Texts, Vehicle, mavsdk_vehicle, until
 from tests.loopback.flights import BRISK, WAITS_ARMED, ready, refused, take_off
@@ -66,6 +69,13 @@ def test_a_kill_near_the_ground_and_a_termination_in_the_air(tmp_path: Path) -> 
         watcher = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(two_ends(vehicle.mavsdk, watcher))
         watcher.close()
+    diary = read_events(tmp_path)
+    said = [event.text for event in diary if event.kind == "statustext"]
+    assert said.index("Disarmed by force: rotors stopped") < said.index("Flight terminated: rotors stopped")
+    assert {"Takeoff", "disarmed"} <= {event.text for event in diary if event.kind == "mode"}
+    recording = read_recording(tmp_path)
+    assert recording.summary["vehicle"] == "iris"
+    assert np.isnan(recording.reference).all()
     flown = swing.read(vehicle.state_log)
     assert flown.vehicle[:, 2].max() > 4.5
     assert flown.vehicle[-1, 2] < 0.5

@@ -17,6 +17,7 @@ from scipy.io import loadmat
 from controller.law.terms import TERM_COLUMNS
 from sitl.export.formats import WRITERS, export
 from sitl.recording.recording import RecordingError, read_recording
+from sitl_bridge.event_log import Event, EventLog
 from sitl_bridge.frames import LocalOrigin, attitude_to_ned_frd, enu_to_ned
 from tests.sitl.export.flights import RATE_HZ, ROWS, leave_flight
 
@@ -114,6 +115,15 @@ def test_mcap_location_is_the_loads_place_on_earth(folder: Path) -> None:
     with export(folder, "mcap").open("rb") as file:
         message = next(iter(make_reader(file).iter_messages(topics=["/load/location"])))[2]
     assert wanted in message.data  # protobuf: the field's tag and its eight bytes
+
+
+def test_mcap_has_the_diary(tmp_path: Path) -> None:
+    leave_flight(tmp_path, rows=3)
+    EventLog(tmp_path).add(Event(0.004, "plant", "fault", "gps is lost"))
+    with export(tmp_path, "mcap").open("rb") as file:
+        messages = [m for _, _, m in make_reader(file).iter_messages(topics=["/log"])]
+    assert [b"gps is lost" in message.data for message in messages] == [True, False]
+    assert messages[0].log_time == round((1.7e9 + 0.004) * 1e9)
 
 
 def test_an_older_export_is_replaced(folder: Path) -> None:
