@@ -15,6 +15,7 @@ from controller.ground.files.ftp import Client as FtpClient
 from controller.ground.files.ftp import Ftp
 from controller.ground.files.logs import MESSAGES as LOG_MESSAGES
 from controller.ground.files.logs import LogProtocol
+from controller.ground.flight import plans, steering
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.motion.geometry import hanging_load
 from controller.ground.flight.motion.sticks import axes_of
@@ -154,7 +155,7 @@ class Inbox:
     def _set_current_item(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         if not self._addressed(message, _MISSION_COMPONENTS):
             return
-        verdict = self._machine.set_current_item(message.seq)
+        verdict = plans.set_current_item(self._machine, message.seq)
         if verdict.ok:
             current = telemetry.build(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, self._machine)
             self._out.broadcast(current, now)
@@ -177,7 +178,7 @@ class Inbox:
             anchor = self._machine.offboard.anchor(message, anchor, now, timeout)
         found = setpoint_of(message, to_load, self._profile, home, anchor, view)
         sender = (peer.address, frame.system, frame.component)
-        fault = found if isinstance(found, str) else self._machine.offer(found, sender, now)
+        fault = found if isinstance(found, str) else steering.offer(self._machine, found, sender, now)
         if fault:
             self._out.say_seldom(peer, fault, now)
 
@@ -186,7 +187,9 @@ class Inbox:
             return
         found = attitude_setpoint_of(message)
         sender = (peer.address, frame.system, frame.component)
-        fault = found if isinstance(found, str) else self._machine.offer_attitude(found, sender, now)
+        fault = (
+            found if isinstance(found, str) else steering.offer_attitude(self._machine, found, sender, now)
+        )
         if fault:
             self._out.say_seldom(peer, fault, now)
 
@@ -198,14 +201,14 @@ class Inbox:
             self._out.say_seldom(peer, "Target denied: its position or velocity is no number", now)
             return
         position = self._profile.origin.local(Geodetic(*degrees, message.alt))
-        self._machine.hear_target(position, enu_to_ned(tuple(message.vel)))
+        steering.hear_target(self._machine, position, enu_to_ned(tuple(message.vel)))
 
     def _sticks(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         axes = axes_of(message)
         if message.target not in (_BROADCAST, self._profile.system) or axes is None:
             return
         sender = (peer.address, frame.system, frame.component)
-        fault = self._machine.move_sticks(axes, sender, now)
+        fault = steering.move_sticks(self._machine, axes, sender, now)
         if fault:
             self._out.say_seldom(peer, fault, now)
 

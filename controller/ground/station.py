@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import common as mavlink
@@ -16,6 +17,7 @@ from controller.ground.commands.service import CommandService
 from controller.ground.files.ftp import Ftp
 from controller.ground.files.logs import LogProtocol, LogStore, NoLogs
 from controller.ground.files.virtual import VirtualFiles
+from controller.ground.flight import client_requests, plans
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.motion.setpoint_types import Target
@@ -96,10 +98,10 @@ class Station:
         self.parameters = Parameters(_own_defaults(profile))
         self.machine = Machine(profile, self.parameters)
         self.missions = Plans(
-            self.machine.accept_plan,
-            self.machine.accept_fence,
-            self.machine.accept_rally,
-            self.machine.go_to_item,
+            partial(plans.accept_mission, self.machine),
+            partial(plans.accept_fence, self.machine),
+            partial(plans.accept_rally, self.machine),
+            partial(client_requests.go_to_item, self.machine),
         )
         standard = standard_peers(profile.instance) if peers is None else peers
         self.peers = Peers(standard, now, self._forget)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from controller.feedback.estimate import EstimateFeedback
 from controller.feedback.health import EstimateAssessor
+from controller.ground.flight import client_requests
 from controller.ground.flight.modes import Machine
 from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import profile_of
@@ -120,7 +121,7 @@ class GuidedFlight:
         """Wait until it can be armed, arm, take off, wait for Hold."""
         self.fly(lambda: not self.machine.arming_faults(), 10.0, "ready to arm")
         assert self.machine.arm(self.now).ok, self.machine.arming_faults()
-        self.machine.takeoff(height)
+        client_requests.takeoff(self.machine, height)
         self.fly(lambda: self.machine.mode.name == "HOLD" and self.machine.flying, 90.0, "hold")
 
     def truth(self) -> tuple[Array, Array]:

@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import common
 from scipy.stats import chi2
 
 from controller.estimator.records import LOAD_ON_CABLE, LOAD_ON_GROUND, PARTS, X_LOAD, Array
-from controller.ground.flight.modes import Reposition
+from controller.ground.flight import client_requests
+from controller.ground.flight.client_requests import Reposition
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.telemetry.messages import build
 from sitl_bridge.plant.physics.state import BODY_RATES
@@ -37,12 +38,12 @@ def test_take_off_with_pick_up_a_way_and_landing() -> None:
     vehicle, load = flight.truth()
     assert vehicle[2] > 4.5
     assert load[2] > 3.0
-    assert flight.machine.reposition(Reposition(False, (8.0, 5.0, NAN), NAN, NAN), True).ok
+    assert client_requests.reposition(flight.machine, Reposition(False, (8.0, 5.0, NAN), NAN, NAN), True).ok
     flight.wait(10.0)
     vehicle, _ = flight.truth()
     assert np.linalg.norm(vehicle[:2] - (8.0, 5.0)) < 0.5
     assert np.abs(flight.errors()[-1]).max() < 0.5
-    assert flight.machine.set_mode(Mode.LAND, flight.now).ok
+    assert client_requests.set_mode(flight.machine, Mode.LAND, flight.now).ok
     flight.fly(lambda: not flight.machine.armed, 60.0, "landed and disarmed")
     assert "Landed" in flight.said
     vehicle, load = flight.truth()
@@ -133,7 +134,7 @@ def test_pick_up_and_set_down_leave_no_false_certainty(name: str, preset: str, s
         squares.append(normalised())
     # One draw of two numbers, seen again and again as it fades: chi-square with two degrees of freedom.
     assert np.mean(squares) < chi2.ppf(0.997, 2) / 2.0
-    assert flight.machine.set_mode(Mode.LAND, flight.now).ok
+    assert client_requests.set_mode(flight.machine, Mode.LAND, flight.now).ok
     flight.fly(lambda: not flight.machine.armed, 60.0, "landed and disarmed")
     landing = flight.errors()[-round(5.0 * RATE_HZ) :]
     assert np.abs(landing[:, 2]).max() < 0.25  # a touch-down is no reason to lose the height

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from controller.ground.flight import client_requests, plans
 from controller.ground.flight.payload.payload import DELIVER, LENGTH, RETRACT
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.missions.mission_plan import Item
@@ -48,9 +49,9 @@ def test_a_mission_delivers_on_estimates_and_returns(vehicle: str, height: float
     flight = GuidedFlight(described, 1, redesigner=Designer(described))
     flight.fly(lambda: not flight.machine.arming_faults(), 10.0, "ready to arm")
     plan = [waypoint(5, 0, height), other(DO_WINCH, 1.0, DELIVER), waypoint(0, 0, height), other(20)]
-    assert flight.machine.accept_plan(tuple(Item(*item) for item in plan)) is None
+    assert plans.accept_mission(flight.machine, tuple(Item(*item) for item in plan)) is None
     assert flight.machine.arm(flight.now).ok
-    assert flight.machine.set_mode(Mode.MISSION, flight.now).ok
+    assert client_requests.set_mode(flight.machine, Mode.MISSION, flight.now).ok
     flight.fly(lambda: "Delivered" in flight.said, 120.0, "delivered")
     assert not flight.simulation.world.cable_holds
     _, load = flight.truth()

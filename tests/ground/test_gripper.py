@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from controller.estimator.records import LOAD_DROPPED
-from controller.ground.flight.modes import Reposition
+from controller.ground.flight import client_requests
+from controller.ground.flight.client_requests import Reposition
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
 from tests.ground.flown import Flown
@@ -93,7 +94,7 @@ def test_on_estimates_the_load_is_released_and_the_vehicle_stays(vehicle: str, h
     flight = GuidedFlight(load_vehicle(vehicle))
     flight.arm_and_take_off(height)
     flight.wait(5.0)
-    assert flight.machine.grip(RELEASE).ok
+    assert client_requests.grip(flight.machine, RELEASE).ok
     first = len(flight.rows)
     flight.wait(15.0)
     _, states, estimates = zip(*flight.rows[first:], strict=True)
@@ -113,7 +114,7 @@ def test_on_estimates_a_dropped_load_is_taken_again(vehicle: str, height: float,
     flight.arm_and_take_off(height)
     flight.wait(3.0)
     for action in (RELEASE, GRAB):
-        assert flight.machine.grip(action).ok
+        assert client_requests.grip(flight.machine, action).ok
         flight.wait(3.0)
     assert flight.feedback.estimator.load_mode == LOAD_DROPPED
     believed = flight.feedback.estimator.state()[3:6]
@@ -122,7 +123,7 @@ def test_on_estimates_a_dropped_load_is_taken_again(vehicle: str, height: float,
     low = flight.vehicle.load.radius + flight.vehicle.cable.rest_length - 0.15
     for aim in (low, height):
         above = Reposition(False, (float(believed[0]), float(believed[1]), aim), NAN, NAN)
-        assert flight.machine.reposition(above, True).ok
+        assert client_requests.reposition(flight.machine, above, True).ok
         assert "Load taken" not in flight.said
         flight.wait(height / 0.7 + 8.0)
     assert "Load taken" in flight.said

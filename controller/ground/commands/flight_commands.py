@@ -8,7 +8,9 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.command import Command, Handler, Requests
 from controller.ground.commands.result import OK, Verdict, deny, not_now
-from controller.ground.flight.modes import Machine, Reposition
+from controller.ground.flight import client_requests, plans
+from controller.ground.flight.client_requests import Reposition
+from controller.ground.flight.modes import Machine
 from controller.ground.flight.motion.geometry import filled
 from controller.ground.flight.motion.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
 from controller.ground.flight.payload.gripper import GRIPPER_ACTIONS, HOLD
@@ -33,7 +35,7 @@ def arm(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict
 
 def takeoff(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """NAV_TAKEOFF."""
-    return machine.takeoff(_height(c, machine))
+    return client_requests.takeoff(machine, _height(c, machine))
 
 
 def set_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -45,7 +47,7 @@ def set_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
     if not all(math.isfinite(number) for number in numbers):
         return deny("Mode denied: the mode is infinite")
     found = find_mode(*numbers)
-    return deny(found) if isinstance(found, str) else machine.set_mode(found, now)
+    return deny(found) if isinstance(found, str) else client_requests.set_mode(machine, found, now)
 
 
 def set_standard_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -53,12 +55,12 @@ def set_standard_mode(c: Command, machine: Machine, requests: Requests, now: flo
     if not math.isfinite(c.p1):
         return deny("Mode denied: the mode is not finite")
     found = find_standard_mode(c.p1)
-    return deny(found) if isinstance(found, str) else machine.set_mode(found, now)
+    return deny(found) if isinstance(found, str) else client_requests.set_mode(machine, found, now)
 
 
 def mode(mode: Mode) -> Handler:
     """A command that asks for a mode."""
-    return lambda c, machine, requests, now: machine.set_mode(mode, now)
+    return lambda c, machine, requests, now: client_requests.set_mode(machine, mode, now)
 
 
 def reposition(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -72,7 +74,7 @@ def reposition(c: Command, machine: Machine, requests: Requests, now: float) -> 
     yaw = math.nan if math.isnan(c.p4) else yaw_from_heading(c.p4) if math.isfinite(c.p4) else c.p4
     speed = c.p1 if c.p1 > 0 else math.nan
     where = Reposition(c.component == COMPONENT_LOAD, (east, north, _height(c, machine)), yaw, speed)
-    return machine.reposition(where, c.p2 == 1.0)
+    return client_requests.reposition(machine, where, c.p2 == 1.0)
 
 
 def orbit(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -89,7 +91,7 @@ def orbit(c: Command, machine: Machine, requests: Requests, now: float) -> Verdi
         return deny(f"Orbit denied: radius {radius:g} m, speed {speed:g} m/s, heading {kind:g}; see DO_ORBIT")
     most = machine.parameters["MPC_XY_VEL_MAX"]
     orbit = Orbit(centre, radius, math.copysign(min(abs(speed), most), speed), Yaw(int(kind)), _or(c.p4, 0.0))
-    verdict = machine.fly_pattern(orbit)
+    verdict = client_requests.fly_pattern(machine, orbit)
     if verdict.ok and orbit.speed < abs(speed) - 0.01:
         requests.say(f"Orbit limited to {orbit.speed:.1f} m/s")
     return verdict
@@ -107,7 +109,9 @@ def figure_eight(c: Command, machine: Machine, requests: Requests, now: float) -
     if not 1.0 <= abs(major) <= LARGEST_RADIUS or not 0.5 <= abs(minor) <= abs(major):
         return deny(f"Figure eight denied: radii {major:g} m and {minor:g} m; from 1 m, the longer first")
     speed = machine.parameters["MPC_XY_CRUISE"]
-    return machine.fly_pattern(FigureEight(centre, major, minor, yaw_from_heading(_or(c.p4, 0.0)), speed))
+    return client_requests.fly_pattern(
+        machine, FigureEight(centre, major, minor, yaw_from_heading(_or(c.p4, 0.0)), speed)
+    )
 
 
 def _centre(c: Command, machine: Machine, name: str) -> Triple | Verdict:
@@ -134,20 +138,24 @@ def gripper(c: Command, machine: Machine, requests: Requests, now: float) -> Ver
     """DO_GRIPPER."""
     if c.p2 not in GRIPPER_ACTIONS:
         return deny(f"Gripper denied: action {c.p2:g}; use 0 (release), 1 (grab) or 2 (hold)")
-    return OK if c.p2 == HOLD and machine.payload.gripper is not None else machine.grip(int(c.p2))
+    return (
+        OK
+        if c.p2 == HOLD and machine.payload.gripper is not None
+        else client_requests.grip(machine, int(c.p2))
+    )
 
 
 def winch(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """DO_WINCH."""
-    return machine.reel(c.p2, c.p3, c.p4)
+    return client_requests.reel(machine, c.p2, c.p3, c.p4)
 
 
 def pause(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """DO_PAUSE_CONTINUE."""
     if c.p1 == 0.0:
-        return machine.set_mode(Mode.HOLD, now)
+        return client_requests.set_mode(machine, Mode.HOLD, now)
     if c.p1 == 1.0 and machine.mission.items:
-        return machine.set_mode(Mode.MISSION, now)
+        return client_requests.set_mode(machine, Mode.MISSION, now)
     return deny(f"Pause or go on denied: param1 is {c.p1:g}; use 0, or 1 with a mission")
 
 
@@ -157,7 +165,7 @@ def change_speed(c: Command, machine: Machine, requests: Requests, now: float) -
         return deny(
             f"Speed of kind {c.p1:g} cannot be set; use 0 or 1 (horizontal), or MPC_Z_VEL_MAX_UP and _DN"
         )
-    return machine.change_speed(c.p2)
+    return client_requests.change_speed(machine, c.p2)
 
 
 def mission_start(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -166,7 +174,7 @@ def mission_start(c: Command, machine: Machine, requests: Requests, now: float) 
         verdict = set_item(c, machine, requests, now)
         if not verdict.ok:
             return verdict
-    return machine.set_mode(Mode.MISSION, now)
+    return client_requests.set_mode(machine, Mode.MISSION, now)
 
 
 def set_item(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -174,7 +182,7 @@ def set_item(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
     if not (math.isfinite(c.p1) and c.p1 == int(c.p1)):
         return deny(f"Mission item {c.p1:g} does not exist; use its number")
     reset = c.number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT and c.p2 == 1.0
-    return machine.set_current_item(int(c.p1), reset)
+    return plans.set_current_item(machine, int(c.p1), reset)
 
 
 def set_home(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:

@@ -12,14 +12,14 @@ from typing import Protocol
 
 from controller.ground.commands.result import INFO, WARNING
 from controller.ground.commands.setpoints import Setpoint
+from controller.ground.flight.home import Home
+from controller.ground.flight.hover_point import HoverPoint
 from controller.ground.flight.limits.fence import Fence, fence_around
 from controller.ground.flight.limits.fence_zones import Place, Zone
 from controller.ground.flight.mission_flight import MissionFlight, Then
 from controller.ground.flight.motion.follow_target import FollowTarget
 from controller.ground.flight.motion.following import Following, height_of
 from controller.ground.flight.motion.geometry import (
-    above,
-    below,
     controlled_body,
     controlled_point,
     limited_speed,
@@ -37,14 +37,10 @@ from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.item_types import TAKEOFF, WITH_POSITION
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
-from sitl_bridge.frames import Geodetic, Triple, euler_from_quaternion
+from sitl_bridge.frames import Triple, euler_from_quaternion
 
 _LIFTING = 0.5
 """Share of the hover thrust below which a vehicle on the ground stays there"""
-_TOUCH_DOWN = 3.0
-"""s after the winch has stood still, in which a load may be found to lie that it has lowered"""
-_NEAR = 1.0
-"""m, within which a vehicle hovers where it is to hover"""
 
 
 class Stage(Enum):
@@ -78,12 +74,11 @@ class Guidance:
         self, profile: Profile, parameters: Parameters, mission: MissionFlight, pilot: Pilot
     ) -> None:
         self.stage = Stage.GROUND
-        self.home: Triple | None = None
-        """m ENU, where the vehicle stood when it was armed last"""
+        self.home = Home(profile.origin)
         self.takeoff_height = math.nan
         """m ENU, of the vehicle, that a take-off was asked for; NaN: by MIS_TAKEOFF_ALT"""
-        self.speed = math.nan
-        """m/s, horizontal, that was asked for; NaN: the default"""
+        self.hover = HoverPoint(profile)
+        """Where it holds, and heads for"""
         self.zones: tuple[Zone, ...] = ()
         """Of the geofence"""
         self.rally_points: tuple[Place, ...] = ()
@@ -94,76 +89,38 @@ class Guidance:
         self._parameters = parameters
         self._mission = mission
         self._pilot = pilot
-        self._home_load: Triple = (0.0, 0.0, 0.0)
-        self._chosen_home: tuple[float, float] | None = None
-        """m, of a home that was set by a command"""
         self._ascent: Ascent | None = None
         self._descent: Descent | None = None
         self._return: ReturnHome | None = None
         self._silent = False
         """Nobody says where he is to be followed to, and that was said"""
-        self._point: Triple = (0.0, 0.0, 0.0)
-        """m, of `_point_of` in HOLD and while waiting"""
-        self._point_of = Body.LOAD
-        self._yaw = 0.0
         self._following = Following(profile, parameters, self.fence, pilot.say)
         self.pattern: Pattern | None = None
         """An orbit in ORBIT, a figure of eight in HOLD"""
         self.followed = FollowTarget()
-        self._set_down = False
-        """The winch has lowered the load to the ground"""
-        self._pays_out = False
-        """The winch has paid out since the last look"""
-        self._paid_out_at = -math.inf
-        """s of the plant's time, of the last look at which it had"""
         self._destination: tuple[Triple, float, float] | None = None
         """Of a reposition that waits for the end of a take-off: vehicle (m), yaw (rad), speed (m/s)"""
 
     # Where it begins
 
-    @property
-    def home_or_origin(self) -> Triple:
-        """Home, the world's origin until there is one."""
-        return self.home or (0.0, 0.0, 0.0)
-
-    def home_geodetic(self) -> Geodetic:
-        """The same as latitude, longitude and altitude."""
-        return self._profile.origin.geodetic(self.home_or_origin)
-
     def fence(self, with_load: bool = True) -> Fence:
         """The limits around home."""
-        return fence_around(self.home_or_origin, self._parameters, self._profile, with_load, self.zones)
-
-    def set_home(self, view: VehicleView) -> None:
-        """Home is here, or where somebody has put it; its height is where the vehicle is."""
-        self.home, self._home_load = view.position, view.load_position
-        if self._chosen_home is not None:
-            self.set_home_to(*self._chosen_home)
-
-    def set_home_to(self, east: float, north: float) -> None:
-        """Home is at a place (m), on the ground that it was on; the load belongs there, too."""
-        self._chosen_home = (east, north)
-        self.home = (east, north, self.home_or_origin[2])
-        self._home_load = (east, north, self._home_load[2])
-
-    def _set_home_below(self, view: VehicleView) -> None:
-        """Home is on the ground under a vehicle that was found in the air."""
-        self.home = self._home_load = (view.position[0], view.position[1], self._profile.ground_height)
+        return fence_around(self.home.or_origin, self._parameters, self._profile, with_load, self.zones)
 
     def begin(self, view: VehicleView) -> None:
         """Armed: on the ground, or in the air already."""
-        self.set_home(view)
+        self.home.set_here(view)
         self.stage = Stage.GROUND if view.vehicle_on_ground else Stage.FLYING
         if self.stage is Stage.FLYING:
-            if self._profile.has_ground:
-                self._set_home_below(view)  # heights above home are above the ground
+            if self._profile.has_ground:  # heights above home are above the ground
+                self.home.set_below(view, self._profile.ground_height)
             self.hold_here(view)
 
     def end(self) -> None:
         """Disarmed."""
         self.stage = Stage.GROUND
         self._ascent = self._descent = self._return = self._destination = self.pattern = None
-        self._set_down = False
+        self.hover.picked_up()
         self.takeoff_height = math.nan
 
     # What is asked of it
@@ -177,9 +134,9 @@ class Guidance:
         """Come to rest, and stay."""
         x, y, z = stopping_point(view, self._parameters, self._pole)
         least = min(self._following.floor(view), height_of(view))
-        self._stay_at((x, y, max(z, least)), controlled_body(view))
-        self._yaw = euler_from_quaternion(view.attitude)[2]
-        self.speed = math.nan
+        self.hover.stay_at((x, y, max(z, least)), controlled_body(view))
+        self.hover.yaw = euler_from_quaternion(view.attitude)[2]
+        self.hover.speed = math.nan
 
     def go_to(self, vehicle: Triple | None, yaw: float, speed: float, view: VehicleView) -> None:
         """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is.
@@ -190,9 +147,9 @@ class Guidance:
             self._destination = None if vehicle is None else (vehicle, yaw, speed)
             return
         if vehicle is not None:
-            self._stay_at(self._controlled(vehicle, view), controlled_body(view))
-        self._yaw = self._yaw if math.isnan(yaw) else yaw
-        self.speed = speed
+            self.hover.stay_at(self._controlled(vehicle, view), controlled_body(view))
+        self.hover.yaw = self.hover.yaw if math.isnan(yaw) else yaw
+        self.hover.speed = speed
 
     def forget_destination(self) -> None:
         """Something else is asked for than the point that waits for the take-off's end, or the pattern."""
@@ -213,7 +170,7 @@ class Guidance:
 
     def start(self, mode: Mode) -> None:
         """Begin a mode in flight, from where the vehicle holds."""
-        self.speed = math.nan
+        self.hover.speed = math.nan
         self._return = None
         self._following.start()
         if mode is Mode.MISSION:
@@ -228,17 +185,17 @@ class Guidance:
             items = self._mission.items
             first = next((item for item in items if item.command in WITH_POSITION), None)
             if first is not None and first.command == TAKEOFF:
-                altitude = plan.place(first, self._profile.origin, self.home_geodetic())[2]
+                altitude = plan.place(first, self._profile.origin, self.home.geodetic())[2]
         height = self.height_of_takeoff(altitude, view)
-        if height > self._asked_height(altitude) + 0.01 and self.home is not None:
-            above = f"{height - self.home[2]:.1f} m"
+        if height > self._asked_height(altitude) + 0.01 and self.home.position is not None:
+            above = f"{height - self.home.position[2]:.1f} m"
             self._pilot.say(INFO, f"Taking off to {above}, so that the load leaves the ground")
         self._ascent = Ascent(height, self._parameters["MPC_TKO_SPEED"], self._profile, view)
-        self._yaw = euler_from_quaternion(view.attitude)[2]
+        self.hover.yaw = euler_from_quaternion(view.attitude)[2]
         self.stage = Stage.ASCENT
 
     def _asked_height(self, altitude: float) -> float:
-        home = self.home_or_origin
+        home = self.home.or_origin
         return home[2] + self._parameters["MIS_TAKEOFF_ALT"] if math.isnan(altitude) else altitude
 
     def height_of_takeoff(self, altitude: float, view: VehicleView | None) -> float:
@@ -255,7 +212,7 @@ class Guidance:
 
     def target(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:
         """Off the ground: what to do now. `setpoint`: by client or pilot; `last`: the target before."""
-        if self._point_of is Body.LOAD and not view.load_attached:
+        if self.hover.body is Body.LOAD and not view.load_attached:
             self._go_on_without_load()
         if self.stage is Stage.ASCENT and self._ascent is not None:
             target = self._ascent.target(view)
@@ -263,27 +220,8 @@ class Guidance:
             return target
         if self.stage is Stage.DESCENT and self._descent is not None:
             return self._descend(self._descent, view, last)
-        self._note_set_down(view)
+        self.hover.note_set_down(view)
         return self._fly(view, setpoint, last)
-
-    def _note_set_down(self, view: VehicleView) -> None:
-        """A load that the winch lowers to the ground, or lifts from it: the vehicle holds where it hovers."""
-        if self._pays_out:
-            self._pays_out, self._paid_out_at = False, view.time
-        lowered = view.time - self._paid_out_at < _TOUCH_DOWN
-        lies = view.load_attached and view.load_on_ground and (lowered or self._set_down)
-        lifted = view.load_attached and view.cable_taut and not view.load_on_ground
-        if self._profile.winch is None or not (lifted if self._set_down else lies):
-            self._set_down = self._set_down and view.load_attached
-            return
-        self._set_down = lies
-        hanging = self._profile.hover_length
-        if lies and self._point_of is Body.LOAD:
-            vehicle = above(self._point, hanging)
-            steady = math.dist(vehicle, view.position) < _NEAR
-            self._stay_at(vehicle if steady else view.position, Body.VEHICLE)
-        elif not lies and self._point_of is Body.VEHICLE:
-            self._stay_at(below(self._point, hanging), Body.LOAD)
 
     def _after_ascent(self, ascent: Ascent, view: VehicleView) -> None:
         done, mode = ascent.step is Step.DONE, self._pilot.mode
@@ -296,9 +234,9 @@ class Guidance:
             self._ascent = None
             reached = ascent.target(view)
             if done:
-                self._stay_at(reached.position, reached.body)
+                self.hover.stay_at(reached.position, reached.body)
             else:
-                self._stay_at(stopping_point(view, self._parameters, self._pole), controlled_body(view))
+                self.hover.stay_at(stopping_point(view, self._parameters, self._pole), controlled_body(view))
             if mode is Mode.TAKEOFF:
                 self._pilot.set_mode_to(Mode.HOLD)
             self.start(self._pilot.mode)
@@ -328,7 +266,7 @@ class Guidance:
         mode = self._pilot.mode
         if mode is Mode.LAND:
             self._land(view, stopping_point(view, self._parameters, self._pole))
-            return self._descend(self._descent, view, last) if self._descent else self._hold(view)
+            return self._descend(self._descent, view, last) if self._descent else self._hold()
         if mode is Mode.RTL:
             return self._return_home(view)
         if mode is Mode.MISSION:
@@ -338,7 +276,7 @@ class Guidance:
         if self.pattern is not None or mode is Mode.ORBIT:
             return self._fly_pattern(view)
         if mode not in (Mode.OFFBOARD, *BY_STICKS) or setpoint is None:
-            return self._hold(view)
+            return self._hold()
         if isinstance(setpoint, Attitude):
             if view.vehicle_on_ground and not self.lifts(setpoint):
                 self.stage = Stage.GROUND
@@ -347,23 +285,16 @@ class Guidance:
             return setpoint
         return self._follow(setpoint, view)
 
-    def lengthened(self, change: float) -> None:
-        """The cable is longer by so much, m: the vehicle stays where it holds, and the load goes down."""
-        self._pays_out = self._pays_out or change > 0.0
-        if self._point_of is Body.LOAD:
-            x, y, z = self._point
-            self._point = (x, y, z - change)
-
-    def _hold(self, view: VehicleView) -> Goto:
-        speed = limited_speed(self.speed, self._parameters)
-        return Goto(self._point_of, self._point, self._yaw, speed)
+    def _hold(self) -> Goto:
+        speed = limited_speed(self.hover.speed, self._parameters)
+        return Goto(self.hover.body, self.hover.point, self.hover.yaw, speed)
 
     def _follow_target(self, view: VehicleView) -> Target:
-        asked = self.followed.setpoint(view, self.home_or_origin, self._parameters)
+        asked = self.followed.setpoint(view, self.home.or_origin, self._parameters)
         self._silent = self._said_once(
             self._silent, self.followed.silent(view), "Nobody to follow: no FOLLOW_TARGET; waiting"
         )
-        return self._hold(view) if asked is None else self._follow(asked, view)
+        return self._hold() if asked is None else self._follow(asked, view)
 
     def _fly_pattern(self, view: VehicleView) -> Target:
         if self.pattern is None:  # the mode was asked for without an orbit: as PX4, round where it is
@@ -379,12 +310,9 @@ class Guidance:
             self._pilot.say(WARNING, text)
         return now
 
-    def _stay_at(self, point: Triple, body: Body) -> None:
-        self._point, self._point_of = point, body
-
     def _go_on_without_load(self) -> None:
-        """The vehicle's point is where it hovered above the load's; it would fall there otherwise."""
-        self._stay_at(above(self._point, self._profile.hover_length), Body.VEHICLE)
+        """The vehicle holds, and returns, where it would have been above the load."""
+        self.hover.without_load()
         if self._return is not None:
             self._return.without_load(self._profile.hover_length)
 
@@ -394,23 +322,23 @@ class Guidance:
 
     def _return_home(self, view: VehicleView) -> Target:
         if self._return is None:
-            home, load = self.home_or_origin, self._home_load
+            home, load = self.home.or_origin, self.home.load
             rally = nearest_rally_point(self.rally_points, view.position, home, self._parameters)
             if rally is not None:
                 home, load = (*rally, home[2]), (*rally, load[2])
                 self._pilot.say(INFO, "Returning to the nearest rally point")
-            self._return = ReturnHome(home, load, self._point, None if rally is not None else home)
+            self._return = ReturnHome(home, load, self.hover.point, None if rally is not None else home)
         if self._return.arrived(view, self._parameters, self._profile):
             self._land(view, self._return.place(view), self._return.stand)
-        self._stay_at(self._return.point, controlled_body(view))
-        return self._hold(view)
+        self.hover.stay_at(self._return.point, controlled_body(view))
+        return self._hold()
 
     def _land(self, view: VehicleView, place: Triple, stand: Triple | None = None) -> None:
         p = self._parameters
         self._ascent = None
         self._descent = Descent(
             place,
-            self.home_or_origin[2],
+            self.home.or_origin[2],
             p["MPC_LAND_SPEED"],
             p["MPC_Z_VEL_MAX_DN"],
             p["LND_BESIDE"],
@@ -428,17 +356,17 @@ class Guidance:
             lambda item: self._place(item, view),
             hanging,
             radius,
-            lambda home: self.set_home_to(home[0], home[1]),
+            lambda home: self.home.move_to(home[0], home[1]),
         )
         if isinstance(step, Then):
             self._after_mission(step, view)
         else:
             self.go_to(step.point, step.yaw, self._mission.speed, view)
-        return self._hold(view)
+        return self._hold()
 
     def _place(self, item: plan.Item, view: VehicleView) -> Triple:
         """Of the vehicle, m: as the item says, or as high as the load needs (where it takes off or lands)."""
-        x, y, z = plan.place(item, self._profile.origin, self.home_geodetic())
+        x, y, z = plan.place(item, self._profile.origin, self.home.geodetic())
         fence = self.fence(view.load_attached)
         return (x, y, max(z, fence.home[2] + fence.least_height))
 
@@ -448,7 +376,7 @@ class Guidance:
             return
         if then is Then.LAND:
             self._pilot.set_mode_to(Mode.LAND)
-            self._land(view, self._point)
+            self._land(view, self.hover.point)
             return
         if then is Then.LOST:
             self._pilot.say(WARNING, "Mission stopped: its jumps go in circles; holding")
@@ -458,11 +386,11 @@ class Guidance:
         else:
             self._pilot.say(INFO, "Mission finished; holding")
         self._pilot.set_mode_to(Mode.HOLD)
-        self.speed = math.nan
+        self.hover.speed = math.nan
 
     def _follow(self, asked: Setpoint, view: VehicleView) -> Target:
-        self._yaw = self._yaw if math.isnan(asked.yaw) else asked.yaw
-        target = self._following.target(asked, view, self._yaw)
+        self.hover.yaw = self.hover.yaw if math.isnan(asked.yaw) else asked.yaw
+        target = self._following.target(asked, view, self.hover.yaw)
         if isinstance(target, Goto):
-            self._stay_at(target.position, target.body)
+            self.hover.stay_at(target.position, target.body)
         return target
