@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from controller.design.names import ON_ESTIMATE
+from controller.design.names import FOR_ESTIMATES
 from controller.feedback.truth import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
@@ -129,7 +129,7 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
     assessor: Assessor | None = None
     if options.feedback == "estimate":
         log, feedback, assessor = _estimating(options, speaker)
-        design = ON_ESTIMATE if design == "default" else design
+        design = FOR_ESTIMATES.get(design, design)
     elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
         log, feedback = _estimating_beside(options)
     terms_log = None if options.out is None else TermsLog(options.out, options.logs)

@@ -1,4 +1,4 @@
-"""The designs that a person can choose: the paper's two, and the one that flies by default."""
+"""The designs that a person can choose: the paper's two, the one that flies by default, a nonlinear one."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from controller.design.estimated_weights import estimated_weights
 from controller.design.lqr import Weights, block_diagonal, sampled_gain, sampled_model
 from controller.design.model import actuated_model, rotor_time_constant, with_integrator
-from controller.design.names import DESIGNS, ON_ESTIMATE
+from controller.design.names import DESIGNS, FOR_ESTIMATES
 from controller.design.remembered import remembered
 from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, STATE, Design
 from controller.law.flatness import body
@@ -115,12 +115,15 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     and when the weights of the description's `[law]` have no solution.
     """
     emphasis = emphasis_of(vehicle)
-    if name == "default":
+    if name in FOR_ESTIMATES:
         record = design_for(vehicle, rate_hz, default_weights(vehicle, emphasis), FEEDFORWARD)
         record["adapts"] = 1
+        record["geometric"] = name == "geometric"
         return record
-    if name == ON_ESTIMATE:
-        return design_for(vehicle, rate_hz, emphasised(estimated_weights(vehicle), emphasis), FEEDFORWARD)
+    if name in FOR_ESTIMATES.values():
+        record = design_for(vehicle, rate_hz, emphasised(estimated_weights(vehicle), emphasis), FEEDFORWARD)
+        record["geometric"] = name == FOR_ESTIMATES["geometric"]
+        return record
     if name == "paper":
         return design_for(vehicle, rate_hz, emphasised(paper_weights(), emphasis), INTEGRATOR)
     if name == "paper-lqr":

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from controller.law.adaptation import ADAPTATION, adapted
 from controller.law.flatness import BODY, STENCIL, flat_motion
 from controller.law.reference import path_derivatives
+from controller.law.rotations import into, out_of, set_frame
 from controller.law.state import (
     BODY_RATES,
     EULER_ANGLES,
@@ -54,6 +55,7 @@ DESIGN = np.dtype(
         ("largest_lean", "f8"),  # rad, that everything but tilt and rates may ask for; 0: no limit
         ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
         ("hover_wrench", "f8", WRENCH_SIZE),
+        ("geometric", "i8"),  # 1: the errors are those of `geometric`, with the same gains
         ("adapts", "i8"),  # 1: it finds out what the description gets wrong
         ("body", BODY),
     ]
@@ -85,6 +87,8 @@ WORK = np.dtype(
         ("rotors", "f8", (2, ACTUATOR_CONTROLS)),
         ("heading", "f8", 2),  # cosine and sine of the reference's yaw
         ("frame", "f8", (3, 3)),  # rows: x, y, z axes, in the world, of the model that the gains are for
+        ("lines", "f8", (4, 3)),  # vectors of the world and the body
+        ("turns", "f8", (3, 3, 3)),  # attitudes: as it is, of the reference, as commanded
         ("body", BODY),  # with what was found of it
         ("stencil", STENCIL),
     ]
@@ -103,39 +107,6 @@ def engaged_memory(load_position: Array) -> Memory:
     memory = np.zeros(1, dtype=MEMORY)
     memory["anchor"] = load_position
     return memory
-
-
-@kernel
-def _set_frame(heading: Array, upward: Array, frame: Array) -> None:
-    """A frame whose z axis is `upward` (3,), its x axis above or below the heading: rows of frame (3, 3)."""
-    east, north = upward[0], upward[1]
-    x, y, z = heading[0] * east + heading[1] * north, heading[0] * north - heading[1] * east, upward[2]
-    in_plane, size = math.sqrt(x * x + z * z), math.sqrt(x * x + y * y + z * z)
-    c_pitch, s_pitch, c_roll, s_roll = z / in_plane, x / in_plane, in_plane / size, -y / size
-    c_yaw, s_yaw = heading[0], heading[1]
-    frame[0, 0], frame[0, 1], frame[0, 2] = c_yaw * c_pitch, s_yaw * c_pitch, -s_pitch
-    frame[1, 0] = c_yaw * s_pitch * s_roll - s_yaw * c_roll
-    frame[1, 1] = s_yaw * s_pitch * s_roll + c_yaw * c_roll
-    frame[1, 2] = c_pitch * s_roll
-    frame[2, 0] = c_yaw * s_pitch * c_roll + s_yaw * s_roll
-    frame[2, 1] = s_yaw * s_pitch * c_roll - c_yaw * s_roll
-    frame[2, 2] = c_pitch * c_roll
-
-
-@kernel
-def _into(frame: Array, vector: Array) -> None:
-    """A vector (3,) of the world, in a frame."""
-    x, y, z = vector[0], vector[1], vector[2]
-    for i in range(3):
-        vector[i] = frame[i, 0] * x + frame[i, 1] * y + frame[i, 2] * z
-
-
-@kernel
-def _out_of(frame: Array, vector: Array) -> None:
-    """A vector (3,) of a frame, in the world."""
-    x, y, z = vector[0], vector[1], vector[2]
-    for i in range(3):
-        vector[i] = frame[0, i] * x + frame[1, i] * y + frame[2, i] * z
 
 
 @kernel
@@ -197,12 +168,12 @@ def deviation(design: Any, memory: Any, path: Any, t: float, estimate: Array, wo
     if design.entry == FEEDFORWARD and (path.pieces > 0 or path.radius > 0.0):
         _thrust_error(work.desired, estimate, work.deviation)
         upward = work.stencil.pull[2] if work.body.load_mass > 0.0 else work.stencil.force[2]
-        _set_frame(work.heading, upward, work.frame)
+        set_frame(work.heading, upward, work.frame)
     else:
         work.frame[2, 0], work.frame[2, 1], work.frame[2, 2] = 0.0, 0.0, 1.0
-        _set_frame(work.heading, work.frame[2], work.frame)
+        set_frame(work.heading, work.frame[2], work.frame)
     for i in range(0, 12, 3):  # both positions, both velocities
-        _into(work.frame, work.deviation[i : i + 3])
+        into(work.frame, work.deviation[i : i + 3])
     yaw = STATE_SIZE - 1
     work.deviation[yaw] -= 2.0 * math.pi * math.floor(work.deviation[yaw] / (2.0 * math.pi) + 0.5)
 
@@ -214,14 +185,7 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
     path: the reference, see `reference`; time runs from the step that engaged the law.
     """
     deviation(design, memory, path, memory.ticks * design.period, estimate, work)
-    for axis in range(3):
-        error = estimate[design.controlled + axis] - work.reference[axis]
-        if memory.ticks > 0:  # trapezoidal rule between the samples
-            memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
-        memory.last_error[axis] = error
-        work.integral[axis] = memory.integral[axis]
-    _into(work.frame, work.integral)
-    memory.ticks += 1
+    integrate(design, memory, estimate, work)
     for k in range(WRENCH_SIZE):
         u = work.feedforward[k]
         work.terms[FEEDFORWARD_TERM, k] = u
@@ -232,16 +196,37 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
         for axis in range(3):
             u -= design.integral_gain[k, axis] * work.integral[axis]
         work.terms[INTEGRAL, k] = u - without_integral
-        without_delay = u
+        work.wrench[k] = u
+    count_under_way(design, memory, work)
+    work.held_back[0] = work.held_back[1] = 0.0
+    if design.largest_lean > 0.0:
+        _limit_lean(design, work)
+
+
+@kernel
+def integrate(design: Any, memory: Any, estimate: Array, work: Any) -> None:
+    """The load's error into memory, and into work.integral in the frame; a tick is over."""
+    for axis in range(3):
+        error = estimate[design.controlled + axis] - work.reference[axis]
+        if memory.ticks > 0:  # trapezoidal rule between the samples
+            memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
+        memory.last_error[axis] = error
+        work.integral[axis] = memory.integral[axis]
+    into(work.frame, work.integral)
+    memory.ticks += 1
+
+
+@kernel
+def count_under_way(design: Any, memory: Any, work: Any) -> None:
+    """Take out of work.wrench what commands and rotors under way are going to do."""
+    for k in range(WRENCH_SIZE):
+        u = work.wrench[k]
         for j in range(WRENCH_SIZE):
             u -= design.lag_gain[k, j] * memory.rotors[j]
             for age in range(design.delay):
                 u -= design.past_gain[age, k, j] * memory.past[age, j]
-        work.terms[DELAY, k] = u - without_delay
+        work.terms[DELAY, k] = u - work.wrench[k]
         work.wrench[k] = u
-    work.held_back[0] = work.held_back[1] = 0.0
-    if design.largest_lean > 0.0:
-        _limit_lean(design, work)
 
 
 @kernel
@@ -288,6 +273,6 @@ def remember(design: Any, memory: Any, work: Any) -> None:
     for axis in range(3):
         for k in range(WRENCH_SIZE):
             work.integral[axis] += design.anti_windup[axis, k] * work.terms[SATURATED, k]
-    _out_of(work.frame, work.integral)
+    out_of(work.frame, work.integral)
     for axis in range(3):
         memory.integral[axis] = work.integral[axis]

@@ -11,9 +11,10 @@ from controller.law.adaptation import adapt, give, set_pace
 from controller.law.allocation import ALLOCATION, MOST_ROTORS, allocate
 from controller.law.approach import advance
 from controller.law.control_law import DESIGN, MEMORY, WORK, remember, step
+from controller.law.geometric import geometric_step
 from controller.law.reference import PATH
 from controller.law.state import STATE_SIZE, Array
-from sitl_bridge.compiled import Buffer, entry_point
+from sitl_bridge.compiled import Buffer, entry_point, kernel
 
 LAW_BUFFERS = (
     Buffer(DESIGN, (1,)),
@@ -23,6 +24,15 @@ LAW_BUFFERS = (
     Buffer(WORK, (1,)),
 )
 """The array arguments of `control_step` in front of estimate and controls: a `Law`."""
+
+
+@kernel
+def law_step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> None:
+    """The step of the law that a design is for: work.wrench = u."""
+    if design.geometric:
+        geometric_step(design, memory, path, estimate, work)
+    else:
+        step(design, memory, path, estimate, work)
 
 
 @entry_point(*LAW_BUFFERS, Buffer(np.float64, (STATE_SIZE,)), Buffer(np.float64, (MOST_ROTORS,)))
@@ -39,7 +49,7 @@ def control_step(
     if design.adapts:
         adapt(design, memory, estimate)
         set_pace(design, memory, path)
-    step(design, memory, path, estimate, work)
+    law_step(design, memory, path, estimate, work)
     limited = allocate(allocations[0], work.wrench, controls, work.achieved, work.rotors)
     if not math.isfinite(work.wrench[0] + work.wrench[1] + work.wrench[2] + work.wrench[3]):
         for i in range(MOST_ROTORS):

@@ -8,7 +8,7 @@ import numpy as np
 
 from controller.design.catalogue import design
 from controller.design.motion.prepared import PreparedMotion
-from controller.design.names import ON_ESTIMATE
+from controller.design.names import FOR_ESTIMATES
 from controller.feedback.truth import PathFrom
 from controller.hil.ticks import TickReader
 from controller.law.allocation import allocation
@@ -39,7 +39,7 @@ class Autopilot:
         """See `terms_log.Termed`."""
         self._controls = controls
         expected = path_from(vehicle.initial_load_position)
-        self._motion = PreparedMotion(expected, vehicle, estimated=design_name == ON_ESTIMATE)
+        self._motion = PreparedMotion(expected, vehicle, estimated=design_name in FOR_ESTIMATES.values())
         self._path_from = path_from
         self._design = design(design_name, vehicle, rate_hz)
         self._allocation = allocation(vehicle)

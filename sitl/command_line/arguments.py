@@ -325,7 +325,8 @@ def _control(parser: argparse.ArgumentParser) -> None:
         "--design",
         choices=DESIGNS,
         default="default",
-        help="gain design: re-weighted for margins, the paper's integral LQR, or its LQR without integrator",
+        help="law and gains: re-weighted for margins, the paper's integral LQR, its LQR without integrator, "
+        "or geometric control",
     )
     add_law(parser)
     parser.add_argument(

@@ -10,7 +10,8 @@ from controller.design.catalogue import design
 from controller.design.margins import closed_loop_matrix, delay_margin, spectral_radius
 from controller.design.model import LinearModel, actuated_model
 from controller.design.names import DESIGNS
-from controller.law.control_law import WORK, Design, engaged_memory, remember, step
+from controller.law.control_law import WORK, Design, engaged_memory, remember
+from controller.law.control_step import law_step
 from controller.law.reference import setpoint
 from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
 from sitl.studies.random_vehicles import random_vehicle
@@ -51,7 +52,7 @@ def flown(
     pieces = (rest, period - rest) if rest > 0 else (period,)
     loads = [x[LOAD_POSITION].copy()]
     for tick in range(ticks):
-        step(law, memory, path, x[:STATE_SIZE] + hover, work)
+        law_step(law, memory, path, x[:STATE_SIZE] + hover, work)
         work.achieved[:] = work.wrench
         remember(law, memory, work)
         commands.append(work.wrench - law.hover_wrench)
@@ -74,6 +75,8 @@ def flown(
         ("paper", "paper, 10 m", 1),
         ("paper-lqr", "paper", 0),
         ("paper-lqr", "large, lag", 1),
+        ("geometric", "paper", 0),
+        ("geometric", "large, lag", 2),
     ],
 )
 def test_the_matrix_is_the_law_on_the_linear_model(name: str, vehicle: str, told: int, extra: float) -> None:
@@ -81,8 +84,8 @@ def test_the_matrix_is_the_law_on_the_linear_model(name: str, vehicle: str, told
     record = design(name, delayed(FLEET[vehicle], told), 100.0)
     delay = extra * 0.01
     start = np.zeros(len(model.A))
-    # Small: away from hover the law turns deviations into its reference's frame.
-    start[:STATE_SIZE] = 1e-5 * np.random.default_rng(3).standard_normal(STATE_SIZE)
+    # Small: away from hover the laws turn deviations into a frame of the reference or the cable.
+    start[:STATE_SIZE] = 1e-6 * np.random.default_rng(3).standard_normal(STATE_SIZE)
     for inputs in ((1,), (0, 3), EVERY_INPUT):
         matrix = closed_loop_matrix(model, record, delay, inputs)
         z = np.zeros(len(matrix))

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller.design.motion.ramp import planned
-from controller.law import control_law, control_step
+from controller.law import control_law, control_step, rotations
 from controller.law.allocation import allocation
 from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, STATE, WORK, engaged_memory
 from controller.law.flatness import STENCIL, body, flat_motion
@@ -235,9 +235,9 @@ def test_thrust_errors_small_and_large() -> None:
 def test_vectors_into_a_frame_and_out_of_it() -> None:
     frame = np.asarray(Rotation.from_euler("ZYX", (0.3, -0.5, 0.9)).as_matrix())
     vector = np.array([1.0, -2.0, 3.0])
-    control_law._into(frame, vector)
+    rotations.into(frame, vector)
     np.testing.assert_allclose(vector, frame @ [1.0, -2.0, 3.0])
-    control_law._out_of(frame, vector)
+    rotations.out_of(frame, vector)
     np.testing.assert_allclose(vector, [1.0, -2.0, 3.0])
 
 

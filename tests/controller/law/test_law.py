@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from controller.design.catalogue import LARGEST_LEAN, design
 from controller.design.motion.ramp import planned
 from controller.design.names import DESIGNS
-from controller.law.control_law import WORK, Design, engaged_memory, remember, step
+from controller.law.control_law import WORK, Design, engaged_memory, remember
+from controller.law.control_step import law_step
 from controller.law.reference import Path, circle, setpoint
 from controller.law.state import EULER_ANGLES, LOAD_POSITION, STATE_SIZE, VEHICLE_POSITION, WRENCH_SIZE, Array
 from sitl.studies.random_vehicles import random_vehicle
@@ -45,7 +46,7 @@ class Stepped:
         self.limit = limit
 
     def __call__(self, estimate: Array) -> Array:
-        step(self.law, self.memory, self.path, estimate, self.work)
+        law_step(self.law, self.memory, self.path, estimate, self.work)
         self.work.achieved[:] = self.work.wrench
         self.work.achieved[0] = min(self.work.wrench[0], self.limit)
         remember(self.law, self.memory, self.work)
