@@ -17,12 +17,12 @@ settings.load_profile("repeatable")
 STATIONS = "tests/loopback/stations/"
 LONG = (
     STATIONS,
-    "tests/sitl/test_paper.py",
+    "tests/sitl/studies/test_paper.py",
     "tests/sitl/studies/",
-    "tests/sitl/test_in_process.py",
+    "tests/sitl/flights/test_in_process.py",
     "tests/loopback/",
     "tests/flights/",
-    "tests/ground/",
+    "tests/controller/ground/",
     "tests/estimator/",
     "tests/over/",
     "tests/docs/",

@@ -30,7 +30,7 @@ from sitl.recording.recording import Columns, read_columns
 from sitl_bridge.vehicle.files import load_vehicle
 from sitl_bridge.vehicle.rotors import rotor_effect
 from tests.controller.fleet import FLEET, delayed
-from tests.ground.flown import Flown
+from tests.controller.ground.flown import Flown
 
 RATE_HZ = 250.0
 
