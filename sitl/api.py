@@ -18,10 +18,7 @@ from controller.law.reference import Path as ReferencePath
 from controller.own_law.find import choose
 from controller.own_law.interface import OwnLaw
 from sitl.flights.in_process import InProcessFlight, fly_in_process
-from sitl.flights.metrics import flight_metrics, reference_positions
-from sitl.flights.outcome import judge
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import PROMISED, clear, draw, read_state_log, write_report, write_summary
 from sitl.flights.scenario import (
     GroundControl,
     Scenario,
@@ -31,8 +28,11 @@ from sitl.flights.scenario import (
     usual_feedback,
     with_agility,
 )
-from sitl.flights.sensing_error import sensing_error
 from sitl.json_values import plain
+from sitl.report.metrics import flight_metrics, reference_positions
+from sitl.report.outcome import judge
+from sitl.report.sensing_error import sensing_error
+from sitl.report.summary import PROMISED, clear, draw, read_state_log, write_report, write_summary
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.plant.faults.schedule import checked
 from sitl_bridge.plant.log.state_log import FILE_NAME
@@ -207,7 +207,7 @@ def _written(
 ) -> tuple[dict[str, Any], dict[str, Array], dict[str, Array] | None]:
     from controller.feedback.log import ESTIMATE_NAME
     from controller.feedback.truth import estimates
-    from sitl.flights.keep import keep_recording
+    from sitl.report.keep import keep_recording
 
     summary = write_report(folder, facts, path, told if estimates(feedback, told) else None, told)
     keep_recording(folder, told, path, logs)

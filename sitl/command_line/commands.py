@@ -224,8 +224,8 @@ def _fly(arguments: argparse.Namespace) -> int:
     from controller.ground.link.ports import STATION_LOCAL
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
-    from sitl.flights.report import written
     from sitl.flights.scenario import GroundControl, load_scenario, with_agility
+    from sitl.report.summary import written
     from sitl.terminal.summary import table
     from sitl_bridge.mavlink.links.address import Address
 

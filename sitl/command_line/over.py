@@ -124,10 +124,10 @@ def fly_over_stack(
 
     A live flight ends when it is stopped, with exit code 0.
     """
-    from sitl.flights.report import written
     from sitl.flights.scenario import GroundControl, load_scenario
     from sitl.over.flight import OverFlight, fly_over
     from sitl.over.flight import table as table_of_step
+    from sitl.report.summary import written
     from sitl.terminal.summary import is_complete, table
 
     for name, why in NOT_OVER_A_STACK.items():

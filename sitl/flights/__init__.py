@@ -1,1 +1,1 @@
-"""One flight: scenario, launch, progress, figures, report."""
+"""One flight: scenario, launch of its processes, progress. What it leaves is `sitl.report`'s."""

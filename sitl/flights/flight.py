@@ -14,10 +14,8 @@ from typing import Any
 
 from controller.feedback.truth import estimates
 from controller.own_law.find import ChosenLaw, make
-from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, watch
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import OF_THE_PLANT, clear, without_files, write_report, write_summary
 from sitl.flights.scenario import (
     GroundControl,
     Scenario,
@@ -26,6 +24,8 @@ from sitl.flights.scenario import (
     suited,
     usual_feedback,
 )
+from sitl.report.keep import keep_recording
+from sitl.report.summary import OF_THE_PLANT, clear, without_files, write_report, write_summary
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
 from sitl_bridge.log_amount import Logs
@@ -252,7 +252,7 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
     def status(event: dict[str, Any]) -> Status:
         import numpy as np
 
-        from sitl.flights.metrics import reference_positions
+        from sitl.report.metrics import reference_positions
 
         if not reference:
             reference.append(path_from(start))

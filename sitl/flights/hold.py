@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sitl.flights.flight import FlightOptions, flight_facts
-from sitl.flights.keep import keep_recording
 from sitl.flights.launch import Outcome, Pair, watch
-from sitl.flights.report import clear, write_report
+from sitl.report.keep import keep_recording
+from sitl.report.summary import clear, write_report
 from sitl.terminal.display import Display
 from sitl.terminal.status import status_of
 from sitl_bridge.process import StopRequest

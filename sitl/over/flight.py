@@ -13,12 +13,12 @@ from typing import Any
 from controller.over.stack import read_stack
 from sitl.flights.flight import new_folder
 from sitl.flights.free_ports import free_ports
-from sitl.flights.keep import keep_recording
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import OF_THE_PLANT, clear, positions, read_state_log, write_report
 from sitl.flights.scenario import GroundControl, Scenario, scenario_vehicle, suited
 from sitl.over.processes import Account, Children
 from sitl.over.window import cut_log, step_figures
+from sitl.report.keep import keep_recording
+from sitl.report.summary import OF_THE_PLANT, clear, positions, read_state_log, write_report
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
 from sitl.terminal.summary import row
@@ -214,7 +214,7 @@ def _facts(options: OverFlight, account: Account, failure: str | None) -> dict[s
 
 
 def _figures(log: dict[str, Any], path: Any) -> dict[str, Any]:
-    from sitl.flights.metrics import reference_positions
+    from sitl.report.metrics import reference_positions
 
     times = log["time_s"]
     return step_figures(

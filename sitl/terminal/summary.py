@@ -5,8 +5,8 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from sitl.flights.metrics import HOLDING_DISTANCE
-from sitl.flights.outcome import FELL
+from sitl.report.metrics import HOLDING_DISTANCE
+from sitl.report.outcome import FELL
 
 NARROW = 60
 """Columns below which the table gives each value a line of its own."""

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.flights.metrics import reference_positions
 from sitl.flights.scenario import GroundControl, Scenario
+from sitl.report.metrics import reference_positions
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Vehicle
 

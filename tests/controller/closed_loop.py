@@ -12,7 +12,7 @@ from controller.law.control_law import WORK, Design, engaged_memory
 from controller.law.control_step import control_step
 from controller.law.reference import Path
 from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
-from sitl.flights.metrics import flight_metrics, reference_positions
+from sitl.report.metrics import flight_metrics, reference_positions
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.vehicle.description import Vehicle
 from tests.controller.coordinates import paper_state
@@ -24,7 +24,7 @@ class Flight(NamedTuple):
     controls: Array  # (n, 16)
     limited: Array  # (n,) whether a rotor was at a limit
     integral: Array  # (n, 3) m s
-    metrics: dict[str, float | bool | None]  # see sitl.flights.metrics
+    metrics: dict[str, float | bool | None]  # see sitl.report.metrics
 
 
 def fly(

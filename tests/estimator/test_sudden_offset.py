@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 import sitl
-from sitl.flights.outcome import FELL
 from sitl.flights.scenario import Scenario
+from sitl.report.outcome import FELL
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from sitl.flights.free_ports import free_ports
-from sitl.flights.report import positions, read_state_log
+from sitl.report.summary import positions, read_state_log
 from tests.loopback.conftest import Process
 from tests.loopback.over_stack import IRIS, SerialLine, StandIn
 from tests.loopback.pymav import PyMav

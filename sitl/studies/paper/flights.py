@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from sitl.flights.flight import FlightOptions
 from sitl.flights.free_ports import free_ports
 from sitl.flights.launch import FlightError, Pair, watch
-from sitl.flights.metrics import reference_positions
-from sitl.flights.report import positions, read_state_log
 from sitl.flights.scenario import GroundControl, load_scenario, scenario_vehicle
+from sitl.report.metrics import reference_positions
+from sitl.report.summary import positions, read_state_log
 from sitl.studies.paper.offline import RATE_HZ
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.plant.log.state_log import FILE_NAME

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sitl.flights.outcome import FELL
+from sitl.report.outcome import FELL
 from sitl.studies.sweep.study import Study
 from sitl.studies.sweep.verdicts import Judged
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sitl.api import Flight, fly
-from sitl.flights.outcome import FELL
 from sitl.flights.scenario import Scenario, load_scenario, scenario_vehicle
+from sitl.report.outcome import FELL
 from sitl.studies.random_vehicles import random_vehicle
 from sitl.studies.sweep.own_values import of_own
 from sitl_bridge.vehicle.description import Vehicle

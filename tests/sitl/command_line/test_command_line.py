@@ -17,8 +17,8 @@ from sitl.command_line.arguments import build_parser
 from sitl.flights.flight import new_folder
 from sitl.flights.launch import FlightError
 from sitl.flights.refusals import check_feasible
-from sitl.flights.report import PROMISED, write_report
 from sitl.flights.scenario import load_scenario
+from sitl.report.summary import PROMISED, write_report
 from sitl.terminal.summary import table
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.patience import PATIENCE

@@ -9,7 +9,7 @@ import pytest
 
 import sitl
 from controller.feedback.log import COVARIANCE_NAME
-from sitl.flights.report import read_state_log
+from sitl.report.summary import read_state_log
 
 
 @pytest.mark.parametrize("seed", [1, 2])

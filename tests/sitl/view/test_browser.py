@@ -141,8 +141,8 @@ def test_an_exported_page_needs_no_server(flight: Path, page: Page) -> None:
 
 
 def test_the_report_draws_its_panels(flight: Path, page: Page) -> None:
-    from sitl.flights.html_report import write_html
     from sitl.recording.recording import read_recording
+    from sitl.report.html_report import write_html
 
     file = flight / "report.html"
     write_html(read_recording(flight), file)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from controller.design.catalogue import paper_weights
 from controller.design.model import LinearModel, with_integrator
-from sitl.flights.metrics import STEADY_FROM
+from sitl.report.metrics import STEADY_FROM
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots, riccati
 from sitl.studies.paper.context import Context

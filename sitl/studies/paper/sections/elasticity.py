@@ -13,7 +13,7 @@ from controller.design.catalogue import design, paper_weights
 from controller.design.lqr import sampled_gain, sampled_model
 from controller.design.model import LinearModel, linear_model, with_integrator
 from controller.law.reference import setpoint
-from sitl.flights.metrics import overshoot_pct, settling_time
+from sitl.report.metrics import overshoot_pct, settling_time
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import offline, page, plots, riccati
 from sitl.studies.paper.context import Context

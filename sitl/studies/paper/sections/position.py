@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from controller.design.catalogue import design
 from controller.law.control_law import STATE
 from controller.law.reference import Path, circle, setpoint
-from sitl.flights.metrics import flight_metrics
+from sitl.report.metrics import flight_metrics
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import offline, page, plots
 from sitl.studies.paper.context import Context

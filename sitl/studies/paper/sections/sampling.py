@@ -17,7 +17,7 @@ from controller.design.catalogue import design, paper_weights
 from controller.design.lqr import SampledGain, sampled_gain, sampled_model
 from controller.design.model import LinearModel
 from controller.law.reference import setpoint
-from sitl.flights.metrics import settling_time
+from sitl.report.metrics import settling_time
 from sitl.studies.paper import offline, page, plots
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.page import Cell

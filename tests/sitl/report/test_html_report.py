@@ -13,18 +13,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.flights.html_report import (
+from sitl.recording.recording import read_recording, write_reference
+from sitl.report.html_report import (
     DISTANCE,
     envelope,
     marked_events,
-    said,
     slack_spans,
     swing_deg,
     tilt_deg,
     two_sigma,
     write_html,
 )
-from sitl.recording.recording import read_recording, write_reference
+from sitl.report.page import said
 from sitl_bridge.event_log import Event, EventLog
 from tests.sitl.export.flights import leave_flight
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.flights.metrics import SETTLED_WINDOW
+from sitl.report.metrics import SETTLED_WINDOW
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]

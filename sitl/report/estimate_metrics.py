@@ -17,7 +17,7 @@ from controller.law.state import (
     VEHICLE_POSITION,
     VEHICLE_VELOCITY,
 )
-from sitl.flights.metrics import steady
+from sitl.report.metrics import steady
 from sitl_bridge.frames import euler_from_quaternion
 
 Array = NDArray[np.float64]

@@ -10,9 +10,6 @@ from controller.law.reference import Path as ReferencePath
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
 from sitl.export.mcap import RATES_HZ as MCAP_HZ
 from sitl.export.mcap import write_mcap
-from sitl.flights.html_report import FILE_NAME as HTML_NAME
-from sitl.flights.html_report import write_html
-from sitl.flights.metrics import reference_positions
 from sitl.recording.recording import (
     RecordingError,
     read_columns,
@@ -20,6 +17,9 @@ from sitl.recording.recording import (
     write_reference,
     write_vehicle,
 )
+from sitl.report.html_report import FILE_NAME as HTML_NAME
+from sitl.report.html_report import write_html
+from sitl.report.metrics import reference_positions
 from sitl_bridge.log_amount import Logs
 from sitl_bridge.plant.log.state_log import FILE_NAME as STATES_NAME
 from sitl_bridge.vehicle.description import Vehicle

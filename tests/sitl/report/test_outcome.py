@@ -12,7 +12,7 @@ import pytest
 
 import sitl
 from sitl.flights.free_ports import free_ports
-from sitl.flights.outcome import FELL, judge
+from sitl.report.outcome import FELL, judge
 from sitl.terminal.summary import IN_WORDS
 from sitl_bridge.plant.lost_vehicle import GRACE
 from sitl_bridge.vehicle.files import load_vehicle

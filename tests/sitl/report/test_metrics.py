@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.law.reference import circle, setpoint
-from sitl.flights.metrics import flight_metrics, reference_positions, settling_time
+from sitl.report.metrics import flight_metrics, reference_positions, settling_time
 
 TIMES = np.arange(0.0, 30.0 + 1e-9, 0.004)
 TARGET = np.array([3.0, 5.0, 2.0])

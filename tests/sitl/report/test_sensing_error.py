@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from sitl.flights.sensing_error import STANDARD_DEVIATIONS, WANDERS, sensing_error
+from sitl.report.sensing_error import STANDARD_DEVIATIONS, WANDERS, sensing_error
 from sitl_bridge.vehicle.files import load_vehicle
 from sitl_bridge.vehicle.sensors import Sensors
 

@@ -15,12 +15,12 @@ from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.law.reference import Path as ReferencePath
 from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
-from sitl.flights.html_report import FILE_NAME as HTML_NAME
-from sitl.flights.metrics import Metrics, flight_metrics, reference_positions
-from sitl.flights.outcome import judge
-from sitl.flights.sensing_error import sensing_error
 from sitl.json_values import plain
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
+from sitl.report.html_report import FILE_NAME as HTML_NAME
+from sitl.report.metrics import Metrics, flight_metrics, reference_positions
+from sitl.report.outcome import judge
+from sitl.report.sensing_error import sensing_error
 from sitl_bridge.event_log import FILE_NAME as EVENTS_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
 from sitl_bridge.plant.log.account import Account
@@ -154,7 +154,7 @@ def estimate_report(
     """`estimate` of the summary, with the bound of the linear filter; None when its log is not complete."""
     from controller.estimator.riccati_bound import load_relative_bound
     from controller.feedback.estimate import tuning_for
-    from sitl.flights.estimate_metrics import estimate_metrics
+    from sitl.report.estimate_metrics import estimate_metrics
 
     try:
         estimates, covariances = (read_state_log(out / name) for name in (ESTIMATE_NAME, COVARIANCE_NAME))

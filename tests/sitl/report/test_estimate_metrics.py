@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controller.feedback.log import COLUMNS, COVARIANCE_COLUMNS, UPPER
-from sitl.flights.estimate_metrics import Log, errors, estimate_metrics
+from sitl.report.estimate_metrics import Log, errors, estimate_metrics
 from sitl_bridge.frames import quaternion_from_euler
 from sitl_bridge.plant.physics.state import COLUMNS as TRUE_COLUMNS
 
