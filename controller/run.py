@@ -220,8 +220,8 @@ def _loop(
             link.send(datagram)
         if own_law is not None and own_law.failure is not None:  # the plant has been told: rotors stopped
             return
-        if guided is not None:  # after the answer: the plant does not wait for ground control
-            guided.exchange(now, heard=received is not None)
+        # After the answer: the plant does not wait for ground control.
+        if guided is not None and guided.exchange(now, heard=received is not None):
             for datagram in guided.to_plant(now):
                 link.send(datagram)
             if guided.mode_title != mode:

@@ -41,6 +41,9 @@ class Assessor(Protocol):
     def contact(self, estimate: Array) -> Contact:
         """What touches what at an estimate (18,), eq. 31."""
 
+    def attached(self, estimate: Array) -> bool:
+        """Whether the load is still on the cable: `load_attached` of `contact`, which takes longer."""
+
     def load_released(self) -> None:
         """The gripper has let the load go."""
 
@@ -88,6 +91,11 @@ class ExactAssessor:
             load_attached=length <= self._lost_length,
             in_flight=not grounded and any(x[6:12]),  # held by the plant it would be at rest
         )
+
+    def attached(self, estimate: Array) -> bool:
+        """By the distance of the bodies."""
+        x = estimate.tolist()
+        return math.dist(x[0:3], x[3:6]) <= self._lost_length
 
     def load_released(self) -> None:
         """Truth does not need to know."""

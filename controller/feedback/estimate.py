@@ -116,6 +116,7 @@ class EstimateFeedback:
     def _align(self, in_flight: bool) -> None:
         self.estimator.reset(in_flight=in_flight)
         self._flown = self._lost = False
+        self._released = False  # nothing holds the vehicle at its start any more
         self._first_usec: int | None = None
         self._tick = self._first_flown = self._falling = 0
         self._last_gps_usec = 0
@@ -176,12 +177,14 @@ class EstimateFeedback:
         """Datagram in, estimator, control step, answer out; between two looks at the estimate's health."""
         answer = answer_estimate.bind(*reader.buffers, *self.estimator.arrays, *law, *writer.buffers)
 
-        def plain_tick(length: int, last_time_usec: int, sequence: int) -> int:
+        def plain_tick(length: int, last_time_usec: int, sequence: int, until_s: float) -> int:
             checks = self._only_good and (self._tick + 1) % CHECK_EVERY == 0
-            released = self._flown and not self.estimator.held
-            if checks or self._lost or self.guessing or not released or self._first_usec is None:
+            if checks or self._lost or self.guessing or not self._flown or self._first_usec is None:
                 return 0
-            size: int = answer(length, last_time_usec, sequence, self._first_usec, self._rate_hz)
+            if not self._released:
+                self._released = not self.estimator.held
+                return 0
+            size: int = answer(length, last_time_usec, sequence, until_s, self._first_usec, self._rate_hz)
             if size:
                 self._tick = self._tick_at(reader.time_usec)
                 self._record()

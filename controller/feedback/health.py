@@ -33,9 +33,13 @@ class EstimateAssessor:
             load_on_ground=has_ground and (load in (LOAD_ON_GROUND, LOAD_DROPPED) or not aligned),
             load_lifted=taut,
             cable_taut=taut,
-            load_attached=load not in (LOAD_RELEASED, LOAD_DROPPED),
+            load_attached=self.attached(estimate),
             in_flight=aligned and estimator.in_flight,
         )
+
+    def attached(self, estimate: Array) -> bool:
+        """As the filter's model of the load has it."""
+        return self._feedback.estimator.load_mode not in (LOAD_RELEASED, LOAD_DROPPED)
 
     def reeled(self, rest_length: float, rate: float) -> None:
         """The filter's cable is as long."""

@@ -14,9 +14,10 @@ from controller.law.state import Array
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.sensors import Sensors
 
-PlainTick = Callable[[int, int, int], int]
+PlainTick = Callable[[int, int, int, float], int]
 """Answers a datagram that the reader holds: (its length, time_usec of the tick before, the answer's sequence
-number) to the answer's length, which the writer holds; 0: it is no plain tick, and nothing was done."""
+number, the plant's time in s before which the tick is to be) to the answer's length, which the writer holds;
+0: it is no plain tick, and nothing was done."""
 PathFrom = Callable[[tuple[float, float, float]], Path]
 """Makes the reference path, given where the load is (m, world) when the law takes over."""
 

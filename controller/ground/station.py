@@ -136,6 +136,8 @@ class Station:
         self._stirred = True
         """Something has come in that the mode machine may have to react to"""
         self._next_look = (-math.inf, -math.inf)
+        self.refresh: Callable[[], None] = lambda: None
+        """Brings the view up to date, before anybody is shown it"""
         self._announced = self._state()
 
     # In
@@ -149,6 +151,7 @@ class Station:
         """One frame of a peer's datagram."""
         self._stirred = True
         self._due = now
+        self.refresh()
         if not self._takes(frame, now):
             self.dropped += 1
             return
@@ -217,6 +220,15 @@ class Station:
         return target
 
     @property
+    def looks_at(self) -> float:
+        """The plant's time, s, from which on `update` looks at the state again."""
+        return self._next_look[0]
+
+    def looks_now(self, now: float) -> bool:
+        """Whether it does so at the next tick, whatever the plant's time is."""
+        return self._stirred or now >= self._next_look[1]
+
+    @property
     def shut_down(self) -> bool:
         """Whether a client has asked for the end of the process."""
         return self._commands.restart == "shut down" and not self.machine.armed
@@ -267,6 +279,7 @@ class Station:
         """Every frame that is due, as datagrams: (to whom, bytes). Costs nothing when nothing is."""
         if now < self._due:
             return []
+        self.refresh()
         if now >= self._housekeeping:
             self._housekeeping = now + _HOUSEKEEPING
             self.peers.forget_silent(now)

@@ -13,7 +13,7 @@ from controller.estimator import step as estimator
 from controller.estimator.step import ESTIMATOR_BUFFERS
 from controller.hil import answers, ticks
 from controller.hil.answers import WRITE_BUFFERS
-from controller.hil.ticks import LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH
+from controller.hil.ticks import LOAD_TRUTH, READ_BUFFERS, TICK, VEHICLE_TRUTH, plant_seconds
 from controller.law import control_step as step
 from controller.law.allocation import MOST_ROTORS
 from controller.law.control_step import LAW_BUFFERS
@@ -30,7 +30,9 @@ _control_step = step.control_step.python
 _write_answer = answers.write_answer.python
 
 
-@entry_point(*READ_BUFFERS, *ESTIMATOR_BUFFERS, *LAW_BUFFERS, *WRITE_BUFFERS, int, int, int, int, float)
+@entry_point(
+    *READ_BUFFERS, *ESTIMATOR_BUFFERS, *LAW_BUFFERS, *WRITE_BUFFERS, int, int, int, float, int, float
+)
 def answer_estimate(
     inboxes: Any,
     payloads: Bytes,
@@ -48,6 +50,7 @@ def answer_estimate(
     length: int,
     last_time_usec: int,
     sequence: int,
+    until_s: float,
     first_time_usec: int,
     rate_hz: float,
 ) -> int:
@@ -56,12 +59,14 @@ def answer_estimate(
 
     Arguments as for the parts: `read_tick`, `intake.give`, the estimator's `tick` and `command`,
     `control_step`, `write_answer`; the estimator's time counts from `first_time_usec`. A plain tick is later
-    than `last_time_usec`, and has nothing for the estimator but HIL_SENSOR.
+    than `last_time_usec` and before `until_s`, and has nothing for the estimator but HIL_SENSOR.
     """
     inbox = inboxes[0]
     found = _read_tick(inboxes, payloads, length)
     time_usec, sensed = inbox.header[1], inbox.sensed
-    if found & ~(VEHICLE_TRUTH | LOAD_TRUTH) != TICK or time_usec <= last_time_usec or sensed[0].has_begun:
+    if found & ~(VEHICLE_TRUTH | LOAD_TRUTH) != TICK or sensed[0].has_begun:
+        return 0
+    if time_usec <= last_time_usec or plant_seconds(time_usec) >= until_s:
         return 0
     _give(sensed, given)
     ticks_since = int((time_usec - first_time_usec) * rate_hz / MICROSECONDS_PER_SECOND + 0.5)

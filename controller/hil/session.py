@@ -7,6 +7,7 @@ overtaken gets none.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import TYPE_CHECKING, Protocol
 
 from pymavlink.dialects.v20 import common
@@ -47,7 +48,13 @@ class Pilot(Protocol):
 
     @property
     def law(self) -> Law | None:
-        """The arrays of `control_step` while `step` does no more than that; None: `step` is to be called."""
+        """The arrays of `control_step`, while that may be all there is to `step`; None: it is not."""
+
+    def whole_until(self, now: float) -> float:
+        """The plant's time, s, before which `step` would do no more than `control_step` on `law`."""
+
+    def flown_whole(self, time_usec: int, now: float) -> None:
+        """A compiled tick did `control_step` instead of `step`, at the tick of `time_usec`."""
 
     @property
     def terms(self) -> Array | None:
@@ -91,7 +98,8 @@ class HilSession:
         self._feedback = feedback
         self._tick_rate = tick_rate
         self._terms_log = terms_log
-        self._plain_tick: PlainTick | None = None
+        self._law: Law | None = None
+        self._plain_tick: PlainTick | None = None  # of that law
         self._instance = instance
         self._out: list[bytes] = []
         self._last_time = 0
@@ -154,14 +162,18 @@ class HilSession:
 
     def _answer_plainly(self, plain_tick: PlainTick, datagram: bytes, now: float) -> bool:
         """Answer in one compiled call; False: there is more to this datagram, nothing was done."""
+        until = self._autopilot.whole_until(now)
+        if until == -inf:
+            return False
         reader, packer, length = self._reader, self._packer, len(datagram)
         reader.view[:length] = datagram
-        size = plain_tick(length, self._last_time, packer.sequence)
+        size = plain_tick(length, self._last_time, packer.sequence, until)
         if size == 0:
             return False
         packer.next_sequence()
         self.steps += 1
         self._last_time = reader.time_usec
+        self._autopilot.flown_whole(self._last_time, now)
         if self._terms_log is not None:
             self._terms_log.tick(self._last_time, self._autopilot)
         self._last_answer = bytes(self._writer.view[:size])
@@ -185,9 +197,7 @@ class HilSession:
             self.steps += 1
             if self._terms_log is not None and self._autopilot.armed:
                 self._terms_log.tick(time_usec, self._autopilot)
-            law = self._autopilot.law
-            if self._plain_tick is None and law is not None:
-                self._plain_tick = self._feedback.plain_tick(self._reader, law, self._writer)
+            self._take_law(self._autopilot.law)
         else:
             self._disarm()
             if estimate is None and self._feedback.needs_truth and now >= self._next_request:
@@ -197,9 +207,17 @@ class HilSession:
         self._last_answer = self._writer.answer(time_usec, self._autopilot.armed)
         self._out.append(self._last_answer)
 
+    def _take_law(self, law: Law | None) -> None:
+        """Another law may fly from the next tick on, or none that a compiled tick could."""
+        if law is not self._law:
+            self._law = law
+            self._plain_tick = (
+                None if law is None else self._feedback.plain_tick(self._reader, law, self._writer)
+            )
+
     def _disarm(self) -> None:
         self._autopilot.disarm()
-        self._plain_tick = None
+        self._take_law(None)
 
     def _connect(self) -> None:
         """What PX4 says on connecting: a heartbeat, and a request for the simulator's state."""

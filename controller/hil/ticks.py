@@ -68,6 +68,12 @@ TICK, VEHICLE_TRUTH, LOAD_TRUTH, OTHERS, GPS = 1, 2, 4, 8, 16
 
 
 @kernel
+def plant_seconds(time_usec: int) -> float:
+    """The plant's time, s."""
+    return time_usec * 1e-6
+
+
+@kernel
 def estimate_from_truth(vehicle: Any, load: Any, estimate: Array) -> None:
     """Eq. 31's state (18,), ENU and FLU, from ODOMETRY of vehicle (velocities in BODY_FRD) and load."""
     q = vehicle.q

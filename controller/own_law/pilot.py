@@ -80,6 +80,13 @@ class OwnLawPilot:
     def attend(self, reader: TickReader) -> None:
         """The estimate is all that the law gets."""
 
+    def whole_until(self, now: float) -> float:
+        """Nothing is compiled of it: `law` is None."""
+        return math.inf
+
+    def flown_whole(self, time_usec: int, now: float) -> None:
+        """Nothing here depends on it."""
+
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -53,6 +54,13 @@ class Autopilot:
         self.armed = False
         self._step = None
         self.law = self.terms = None
+
+    def whole_until(self, now: float) -> float:
+        """A law that flies has nothing else to do, ever."""
+        return math.inf
+
+    def flown_whole(self, time_usec: int, now: float) -> None:
+        """Nothing here depends on it."""
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""

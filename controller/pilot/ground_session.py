@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from controller.design.client import DesignProcess
@@ -15,6 +16,8 @@ from sitl_bridge.vehicle.description import Vehicle
 
 LONGEST_WAIT = 0.02
 """s, between two looks at the sockets when the plant is silent"""
+LOOK_PERIOD = 0.001
+"""s, at least, between two looks when it is not: ticks may come far faster"""
 
 
 class Guided:
@@ -40,6 +43,7 @@ class Guided:
         self._designer = DesignProcess(vehicle, rate_hz)
         self._packer = Packer(vehicle_system(instance), COMPONENT_AUTOPILOT)
         self._pilot: GuidedAutopilot | None = None
+        self._next_look = -math.inf
 
     def autopilot(self, controls: Array) -> GuidedAutopilot:
         """The autopilot around its rotor commands (16,)."""
@@ -67,11 +71,18 @@ class Guided:
         messages = self._link.station.plant_commands.to_plant(now)
         return [self._packer.pack(message) for message in messages]
 
-    def exchange(self, now: float, heard: bool) -> None:
-        """Serve ground control; `heard`: whether the plant has said something since the last time."""
+    def exchange(self, now: float, heard: bool) -> bool:
+        """Serve ground control, if it is time to; `heard`: whether the plant has just said something.
+
+        Returns whether it was: else nothing is different from the last time.
+        """
+        if heard and now < self._next_look and now < self._link.station.next_deadline(now):
+            return False
+        self._next_look = now + LOOK_PERIOD
         if not heard and self._pilot is not None:
             self._pilot.wait(now)
         self._link.exchange(now)
+        return True
 
     def close(self) -> None:
         """Free the ports, give up what is under way."""

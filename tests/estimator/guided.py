@@ -18,7 +18,8 @@ from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
 from controller.law.state import Array
-from controller.pilot.ground_piloted import GuidedAutopilot, Redesigner
+from controller.pilot.ground_piloted import GuidedAutopilot
+from controller.pilot.guided_laws import Redesigner
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices
@@ -83,9 +84,10 @@ class GuidedFlight:
         self.session = new_session(self._autopilot, 0, self.said.append, self.feedback)
 
     def _autopilot(self, controls: Array) -> GuidedAutopilot:
-        return GuidedAutopilot(
+        self.pilot = GuidedAutopilot(
             self.vehicle, RATE_HZ, self.station, self._redesigner, controls, EstimateAssessor(self.feedback)
         )
+        return self.pilot
 
     @property
     def machine(self) -> Machine:

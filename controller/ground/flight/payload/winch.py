@@ -81,6 +81,11 @@ class Winch:
         high = before + step if before >= 0.0 else 0.0
         self._commanded = min(max(wanted, low), high)
 
+    @property
+    def still(self) -> bool:
+        """Whether it stands, and is to go on standing."""
+        return self.speed == self._commanded == self._wanted_rate() == 0.0
+
     def relax(self) -> None:
         """Open the clutch: the cable runs out by its tension."""
         self.target, self._rate, self.free = None, 0.0, True

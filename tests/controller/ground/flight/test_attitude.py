@@ -204,7 +204,7 @@ def test_hover_thrust_hovers_and_a_tilt_is_taken_with_a_small_lag(vehicle: str) 
     # A roll of 10 degrees, with the thrust that carries the weight all the same.
     roll = math.radians(10.0)
     it.asked = message(ATTITUDE, (roll, 0.0, heading), thrust=hover / math.cos(roll))
-    law = it.flown.pilot._attitude_law[0]
+    law = it.flown.pilot._laws._attitude_law[0]
     settle = 3.0 * (1.0 / law["rate_gain"][0] + 1.0 / law["attitude_gain"][0])
     it.flown.run(settle)
     assert it.euler()[0] == pytest.approx(roll, abs=math.radians(1.5))
@@ -239,11 +239,11 @@ def test_position_control_takes_over_without_a_jump_of_thrust_and_the_load_comes
     it.flown.run(1.0)
     it.asked = message(ATTITUDE, (0.1, 0.0, heading), thrust=hover)
     it.flown.run(1.0)
-    before = np.array(it.view.position), np.array(it.flown.pilot._controls[:4])
+    before = np.array(it.view.position), np.array(it.flown.pilot._laws._controls[:4])
     it.asked = None
     assert it.client.command(176, 1, 4, 3).result == ACCEPTED
     it.flown.run(0.02)
-    after = np.array(it.flown.pilot._controls[:4])
+    after = np.array(it.flown.pilot._laws._controls[:4])
     assert np.abs(after - before[1]).max() < 0.1
     it.flown.run(8.0)
     assert np.linalg.norm(it.view.velocity) < 0.05
