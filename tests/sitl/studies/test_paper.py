@@ -16,6 +16,8 @@ import pytest
 
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, riccati
+from sitl.studies.paper.analysis import controllability, linear_model, printed_model, sampled_loop, stiffness
+from sitl.studies.paper.analysis.step import vehicle_with
 from sitl.studies.paper.record import (
     CORRECTED,
     NOT_JUDGED,
@@ -26,8 +28,7 @@ from sitl.studies.paper.record import (
     Ledger,
 )
 from sitl.studies.paper.run import run
-from sitl.studies.paper.sections import elasticity, linear, motions, sampling
-from sitl.studies.paper.sections.position import vehicle_with
+from sitl.studies.paper.sections import elasticity, motions
 from sitl_bridge.process import StopRequest
 from sitl_bridge.vehicle.files import load_vehicle
 
@@ -237,10 +238,10 @@ def test_a_table_shows_what_the_ledger_has_and_nothing_else() -> None:
 
 
 def test_f2_is_a_transcription_of_its_own() -> None:
-    a, in_text = linear.linmod_matrix()
+    a, in_text = printed_model.linmod_matrix()
     assert np.count_nonzero(in_text) == 323
     assert not in_text[17, 17]
-    assert np.array_equal(a, linear.printed_matrices()[0])
+    assert np.array_equal(a, printed_model.printed_matrices()[0])
 
 
 def test_what_drives_an_oscillation_is_not_taken_for_its_own() -> None:
@@ -264,17 +265,17 @@ def test_what_drives_an_oscillation_is_not_taken_for_its_own() -> None:
 
 def test_two_ways_to_a_delay_margin() -> None:
     """A double integrator with u = -(x + 2 x'), whose margin one can work out."""
-    model = sampling.LinearModel(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]))
+    model = sampled_loop.LinearModel(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]))
     gain = np.array([[1.0, 2.0]])
     crossover = math.sqrt(2.0 + math.sqrt(5.0))
     margin = math.atan(2.0 * crossover) / crossover
-    assert sampling.delay_margins(model, gain) == pytest.approx([margin], rel=1e-6)
-    assert sampling.delay_until_unstable(model, gain, 0) == pytest.approx(margin, rel=1e-4)
+    assert sampled_loop.delay_margins(model, gain) == pytest.approx([margin], rel=1e-6)
+    assert sampled_loop.delay_until_unstable(model, gain, 0) == pytest.approx(margin, rel=1e-4)
 
 
 def test_gains_without_a_riccati_solver_are_optimal() -> None:
     """One state, worked out by hand: x' = x + u with Q = R = 1 has K = 1 + sqrt(2)."""
-    model, one = sampling.LinearModel(np.eye(1), np.eye(1)), np.eye(1)
+    model, one = sampled_loop.LinearModel(np.eye(1), np.eye(1)), np.eye(1)
     optimum = riccati.continuous(model, riccati.Weights(one, one))
     assert optimum.gain[0, 0] == pytest.approx(1.0 + math.sqrt(2.0))
     assert optimum.poles[0] == pytest.approx(-math.sqrt(2.0))
@@ -289,10 +290,10 @@ def test_gains_without_a_riccati_solver_are_optimal() -> None:
 
 def test_second_simulation_sampled_stays_where_it_hovers() -> None:
     vehicle = vehicle_with("1")
-    gain, _ = linear.gains(vehicle, integral=True)
+    gain, _ = linear_model.gains(vehicle, integral=True)
     law = second.Law(
         0.1 * gain,
-        linear.hover_point(vehicle),
+        linear_model.hover_point(vehicle),
         np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0]),
         lambda _: (0, 0, 0),
     )
@@ -311,8 +312,8 @@ def test_a_value_that_is_not_finite_is_no_number() -> None:
 
 def test_exact_rank() -> None:
     third = Fraction(1, 3)
-    assert linear.rank([[third, 1 - third], [Fraction(1), Fraction(2)]]) == 1
-    assert linear.rank([[third, third], [Fraction(1), Fraction(2)]]) == 2
+    assert controllability.rank([[third, 1 - third], [Fraction(1), Fraction(2)]]) == 1
+    assert controllability.rank([[third, third], [Fraction(1), Fraction(2)]]) == 2
 
 
 def test_second_simulation_turns_its_state_back_and_forth() -> None:
@@ -329,5 +330,5 @@ def test_second_simulation_hovers() -> None:
 @pytest.mark.parametrize("key", [*elasticity.OTHERS, "cable.stiffness"])
 def test_a_sweep_draws_the_vehicles_that_it_says(key: str, monkeypatch: pytest.MonkeyPatch) -> None:
     values = elasticity.STIFFNESSES if key == "cable.stiffness" else elasticity.OTHERS[key][1]
-    monkeypatch.setattr(elasticity, "respond", lambda vehicle: vehicle)
-    assert elasticity.swept(key, values) == {value: elasticity.on(f"{key}={value!r}") for value in values}
+    monkeypatch.setattr(stiffness, "respond", lambda vehicle: vehicle)
+    assert stiffness.swept(key, values) == {value: stiffness.on(f"{key}={value!r}") for value in values}

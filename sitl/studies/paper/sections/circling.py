@@ -13,13 +13,13 @@ from controller.design.model import LinearModel, with_integrator
 from sitl.report.metrics import STEADY_FROM
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots, riccati
+from sitl.studies.paper.analysis.linear_model import gains, hover_point
+from sitl.studies.paper.analysis.starts import largest_difference
+from sitl.studies.paper.analysis.step import LENGTHS, around, law
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Flight, Request
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import UNSUPPORTED, Ledger
-from sitl.studies.paper.sections.linear import gains, hover_point
-from sitl.studies.paper.sections.lqr_hover import largest_difference
-from sitl.studies.paper.sections.position import LENGTHS, around, law
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]

@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.design.catalogue import design, paper_weights
+from controller.design.catalogue import paper_weights
 from controller.design.lqr import sampled_gain, sampled_model
-from controller.design.model import LinearModel, linear_model, with_integrator
-from controller.law.reference import setpoint
-from sitl.report.metrics import overshoot_pct, settling_time
+from controller.design.model import linear_model, with_integrator
+from sitl.report.metrics import settling_time
 from sitl.studies.paper import independent_simulation as second
-from sitl.studies.paper import offline, page, plots, riccati
+from sitl.studies.paper import page, riccati
+from sitl.studies.paper.analysis.crossed_gains import crossed_growths, crossed_growths_again, hover_wrench
+from sitl.studies.paper.analysis.linear_model import damping_ratio, gains, hover_point
+from sitl.studies.paper.analysis.step import TARGET
+from sitl.studies.paper.analysis.stiffness import (
+    DURATION,
+    FAST_HZ,
+    LINMOD_TOLERANCE,
+    RATE_HZ,
+    ROW,
+    ROW_HEAD,
+    Response,
+    fly_again,
+    nearest,
+    on,
+    settling_by_continuous_law,
+    settling_by_fast_sampling,
+    swept,
+)
 from sitl.studies.paper.context import Context
+from sitl.studies.paper.drawings.elasticity import draw_crossed, draw_stiffness
 from sitl.studies.paper.flights import Request
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
-from sitl.studies.paper.sections.linear import damping_ratio, gains, hover_point, open_loop_modes
-from sitl.studies.paper.sections.position import TARGET, law
-from sitl.studies.paper.sections.sampling import held, spectral_radius
-from sitl.studies.sweep.draws import draws
-from sitl.studies.sweep.study import Study, Vary
-from sitl.studies.sweep.worker import drawn
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import load_vehicle
 
 Array = NDArray[np.float64]
 
@@ -40,59 +49,7 @@ OTHERS: dict[str, tuple[str, tuple[float, ...]]] = {
     "cable.rest_length": ("l₀ [m]", (0.5, 1.0, 2.0, 5.0, 10.0, 20.0)),
     "load.mass": ("m_p [kg]", (1.0, 3.0, 10.0, 15.0)),
 }
-DURATION = 15.0
-"""s"""
-RATE_HZ = offline.RATE_HZ
-FAST_HZ = 1000.0
-"""Where the continuous gains, held, are stable without delay."""
 CHOSEN = "chosen: a value of the sweep, not a result"
-BASE = ("cable.rest_length=10",)
-"""V.B's cable; everything else is Table I's."""
-
-
-class Response(NamedTuple):
-    """V.B's step with the paper's weights, for one cable and load."""
-
-    bounce: complex
-    """Open-loop pole, 1/s"""
-    pendulum: float
-    """Open-loop frequency, rad/s"""
-    bounce_closed: complex
-    """The closed loop's pole nearest to the open loop's bounce, 1/s"""
-    stretch: float
-    """m"""
-    settling: float | None
-    """2 %, s"""
-    overshoot: float
-    """%"""
-    peak_tension: float
-    """N"""
-    diverged: bool
-
-
-ROW = (
-    "stretch_m",
-    "bounce_frequency_hz",
-    "bounce_damping_ratio",
-    "bounce_damping_ratio_closed_loop",
-    "pendulum_frequency_hz",
-    "settling_time_2pct_s",
-    "overshoot_pct",
-    "peak_tension_N",
-)
-"""What the page's tables show of a row, in their order."""
-ROW_HEAD = (
-    "stretch [m]",
-    "bounce [Hz]",
-    "its damping ratio",
-    "in closed loop",
-    "pendulum [Hz]",
-    "2 % settling [s]",
-    "overshoot [%]",
-    "peak tension [N]",
-)
-LINMOD_TOLERANCE = 1e-4
-"""Of frequencies (relative) and damping ratios against those of a Jacobian taken by differences."""
 
 
 def record(ledger: Ledger, key: str, vehicle: Vehicle, found: Response) -> None:
@@ -144,42 +101,6 @@ def record(ledger: Ledger, key: str, vehicle: Vehicle, found: Response) -> None:
     ledger.check(f"{key}.peak_tension_N", found.peak_tension, other.peak_tension, 0.01, "N", again)
 
 
-def nearest(poles: Any, wanted: complex) -> complex:
-    """That of the poles which is nearest."""
-    return complex(poles[np.argmin(np.abs(poles - wanted))])
-
-
-class Step(NamedTuple):
-    """What V.B came to."""
-
-    settling: float | None
-    """2 %, s; None: not settled"""
-    overshoot: float
-    """%"""
-    peak_tension: float
-    """N"""
-    diverged: bool
-
-
-def step_of(run: second.Run | offline.Motion, tension: Array) -> Step:
-    """V.B's figures of a run and the cable's tension in it (n,), N."""
-    error = np.linalg.norm(run.load - np.array(TARGET), axis=1)
-    return Step(
-        settling=None if run.diverged else settling_time(run.time, error, 0.02 * float(error[0])),
-        overshoot=overshoot_pct(run.load, run.load[0], np.array(TARGET)) or 0.0,
-        peak_tension=float(tension.max()),
-        diverged=run.diverged,
-    )
-
-
-def fly_again(vehicle: Vehicle, gain: Array) -> Step:
-    """V.B in the second simulation, with a sampled gain (4, 21), and without rotor limits."""
-    u_star = np.array([vehicle.hover_thrust, 0.0, 0.0, 0.0])
-    law = second.Law(gain, hover_point(vehicle), u_star, lambda _: TARGET)
-    run = second.fly_sampled(vehicle, law, 1.0 / RATE_HZ, round(DURATION * RATE_HZ), steps=2)
-    return step_of(run, offline.cable_tension(vehicle, run.states))
-
-
 def requests(quick: bool) -> list[Request]:
     """The points of the sweep over the stiffness that fly over the link too."""
     return [Request("setpoint", "paper", DURATION, (f"cable.stiffness={k!r}",)) for k in FLOWN]
@@ -188,56 +109,6 @@ def requests(quick: bool) -> list[Request]:
 def section(context: Context) -> str:
     """The section's content."""
     return _stiffness(context) + _others(context) + _crossed(context)
-
-
-def on(*overrides: str) -> Vehicle:
-    """The paper's vehicle with V.B's cable and these overrides."""
-    return load_vehicle("paper", [*BASE, *overrides])
-
-
-def swept(key: str, values: Sequence[float]) -> dict[float, Response]:
-    """V.B for each value of a key of the vehicle: a study as `sitl sweep` draws it, simulated offline."""
-    varied = Vary(key=key, values=tuple(values))
-    study = Study(name=f"V.B over {key}", scenario="setpoint", designs=("paper",), vary=(varied,))
-    plain = study.model_dump(mode="json")
-    return {draw.inputs[key]: respond(drawn(plain, draw.inputs).told) for draw in draws(study)}
-
-
-def settling_by_continuous_law(vehicle: Vehicle) -> float:
-    """2 % settling time, s, of V.B with the paper's continuous gains, in the second simulation."""
-    times = np.linspace(0.0, DURATION, round(DURATION * RATE_HZ) + 1)
-    run = second.fly(vehicle, law(vehicle, lambda _: TARGET), times)
-    error = np.linalg.norm(run.load - np.array(TARGET), axis=1)
-    return settling_time(run.time, error, 0.02 * float(error[0])) or math.inf
-
-
-def respond(vehicle: Vehicle, name: str = "paper") -> Response:
-    """Simulate V.B for a vehicle, with a design made for it."""
-    bounce, pendulum, _ = (pole for _, pole, _ in open_loop_modes(vehicle))
-    model = with_integrator(linear_model(vehicle))
-    gain = sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ))
-    a, b = held(model, 1.0 / RATE_HZ)
-    closed = np.log(np.linalg.eigvals(a - b @ gain.state).astype(complex)) * RATE_HZ
-    run = offline.closed_loop(
-        vehicle, design(name, vehicle, RATE_HZ), setpoint(TARGET, (0.0, 0.0, 0.0)), DURATION
-    )
-    return Response(
-        bounce=bounce,
-        pendulum=pendulum.imag,
-        bounce_closed=nearest(closed, bounce),
-        stretch=vehicle.hover_length - vehicle.cable.rest_length,
-        **step_of(run, run.tension)._asdict(),
-    )
-
-
-def settling_by_fast_sampling(vehicle: Vehicle) -> float:
-    """The same, in the plant with its rotor limits, the continuous gains held at FAST_HZ."""
-    gain, _ = gains(vehicle, integral=True)
-    held_gains = design("paper", vehicle, FAST_HZ)
-    held_gains["state_gain"], held_gains["integral_gain"] = gain[:, :18], gain[:, 18:]
-    path = setpoint(TARGET, (0.0, 0.0, 0.0))
-    run = offline.closed_loop(vehicle, held_gains, path, DURATION, FAST_HZ)
-    return step_of(run, run.tension).settling or math.inf
 
 
 def _stiffness(context: Context) -> str:
@@ -329,7 +200,7 @@ def _stiffness(context: Context) -> str:
         )
         + page.heading("Stiffness")
         + page.figure(
-            _draw_stiffness(table, flown_rows),
+            draw_stiffness(table, flown_rows),
             "<b>Over the stiffness k_a.</b> Dots: the sweep; rings: flown over the link.",
             [request.command for request in requests(context.quick)],
         )
@@ -379,31 +250,6 @@ def _others(context: Context) -> str:
     return "".join(blocks)
 
 
-def crossed_growths_again(vehicles: Sequence[Vehicle]) -> Array:
-    """The same from the second simulation's Jacobians, and gains without a Riccati solver."""
-    models = [
-        with_integrator(LinearModel(*second.jacobians(v, hover_point(v), hover_wrench(v)))) for v in vehicles
-    ]
-    period = 1.0 / RATE_HZ
-    made = [riccati.sampled(sampled_model(model, paper_weights(), period)).gain for model in models]
-    loops = [held(model, period) for model in models]
-    radii = [[np.abs(np.linalg.eigvals(a - b @ gain)).max() for a, b in loops] for gain in made]
-    return np.asarray(np.log(np.array(radii)) * RATE_HZ)
-
-
-def hover_wrench(vehicle: Vehicle) -> second.Wrench:
-    """u* of a vehicle."""
-    return vehicle.hover_thrust, 0.0, 0.0, 0.0
-
-
-def crossed_growths(vehicles: Sequence[Vehicle]) -> Array:
-    """Growth rates (designed for, flown on), 1/s, of the sampled loops; below 0: stable."""
-    models = [with_integrator(linear_model(vehicle)) for vehicle in vehicles]
-    made = [sampled_gain(sampled_model(model, paper_weights(), 1.0 / RATE_HZ)) for model in models]
-    radii = [[spectral_radius(model, gain, 1.0 / RATE_HZ, 0) for model in models] for gain in made]
-    return np.asarray(np.log(np.array(radii)) * RATE_HZ)
-
-
 def _crossed(context: Context) -> str:
     """How far a controller designed for one cable flies another."""
     ledger = context.ledger
@@ -434,67 +280,10 @@ def _crossed(context: Context) -> str:
         ledger.check(f"{name}.stable_pairs", stable, int(np.sum(again < 0.0)), 0, "", source)
         blocks.append(
             page.figure(
-                _draw_crossed(growths, values, label),
+                draw_crossed(growths, values, label),
                 f"<b>Designed for one {label.split()[0]}, flown on another.</b> Growth rate of the sampled "
                 "linear loop: "
                 f"blue and negative is stable, red unstable. {stable} of {growths.size} pairs are stable.",
             )
         )
     return page.heading("Controllers on cables that they were not designed for") + "".join(blocks)
-
-
-def _draw_stiffness(table: dict[float, Response], flown: Sequence[Sequence[Any]]) -> bytes:
-    figure, axes = plots.panels(2, 2, height=2.6, sharex=True)
-    ks = list(table)
-    rings: dict[str, Any] = {"ls": "", "marker": "o", "ms": 11, "mfc": "none"}
-    ax: Any = axes[0, 0]
-    ax.loglog(
-        ks, [abs(r.bounce) / (2 * math.pi) for r in table.values()], ".-", color=plots.CABLE, label="bounce"
-    )
-    ax.loglog(
-        ks, [r.pendulum / (2 * math.pi) for r in table.values()], ".-", color=plots.LOAD, label="pendulum"
-    )
-    ax.set_ylabel("open-loop frequency [Hz]")
-    ax = axes[0, 1]
-    ax.loglog(
-        ks,
-        [damping_ratio(r.bounce) for r in table.values()],
-        ".-",
-        color=plots.CABLE,
-        label="bounce, open loop",
-    )
-    closed = [damping_ratio(r.bounce_closed) for r in table.values()]
-    ax.loglog(ks, closed, ".--", color=plots.CABLE, label="closed loop")
-    ax.set_ylabel("damping ratio")
-    ax = axes[1, 0]
-    ax.semilogx(ks, [r.settling for r in table.values()], ".-", color=plots.LOAD, label="offline")
-    ax.semilogx(
-        [row[0] for row in flown], [row[1] for row in flown], color=plots.LOAD, label="flown", **rings
-    )
-    ax.set(xlabel="stiffness k_a [N/m]", ylabel="2 % settling time [s]", ylim=(0, None))
-    ax = axes[1, 1]
-    ax.semilogx(ks, [r.peak_tension for r in table.values()], ".-", color=plots.CABLE, label="offline")
-    ax.semilogx(
-        [row[0] for row in flown], [row[2] for row in flown], color=plots.CABLE, label="flown", **rings
-    )
-    ax.axhline(98.1, color=plots.NEUTRAL, lw=1.0, label="weight of the load")
-    ax.set(xlabel="stiffness k_a [N/m]", ylabel="peak tension [N]", ylim=(0, None))
-    for ax in axes.flat:
-        ax.legend(fontsize="small")
-    return plots.png(figure)
-
-
-def _draw_crossed(growths: Array, values: Sequence[float], label: str) -> bytes:
-    figure, axes = plots.panels(1, height=3.6, width=6.5)
-    ax: Any = axes[0, 0]
-    ax.grid(False)
-    image = ax.imshow(growths, cmap="RdBu_r", vmin=-1.5, vmax=1.5, aspect="auto")
-    names = [f"{v:g}" for v in values]
-    ax.set_xticks(range(len(values)), names)
-    ax.set_yticks(range(len(values)), names)
-    for (i, j), growth in np.ndenumerate(growths):
-        colour = "white" if abs(growth) > 0.9 else "black"
-        ax.text(j, i, f"{growth:.2f}", ha="center", va="center", fontsize=8, color=colour)
-    ax.set(xlabel=f"flown on {label}", ylabel=f"designed for {label}")
-    figure.colorbar(image, label="growth rate [1/s]")
-    return plots.png(figure)

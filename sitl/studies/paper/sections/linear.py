@@ -3,110 +3,39 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.design.catalogue import paper_lqr_weights, paper_weights
-from controller.design.lqr import continuous_gain
-from controller.design.model import LinearModel, linear_model, with_integrator
+from controller.design.model import LinearModel, linear_model
 from sitl.studies.paper import independent_simulation as second
-from sitl.studies.paper import page, plots, riccati
+from sitl.studies.paper import page, riccati
+from sitl.studies.paper.analysis.controllability import exact_model, product, rank
+from sitl.studies.paper.analysis.linear_model import (
+    complex_text,
+    damping_ratio,
+    gains,
+    hover_point,
+    lengths,
+    open_loop_modes,
+    sorted_poles,
+)
+from sitl.studies.paper.analysis.printed_model import PRINTED_LENGTH, STATES, linmod_matrix, printed_matrices
 from sitl.studies.paper.context import Context
+from sitl.studies.paper.drawings.linear import draw_poles
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED
-from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
 
 Array = NDArray[np.float64]
-Rational = list[list[Fraction]]
-
-STATES = [
-    "x_v",
-    "y_v",
-    "z_v",
-    "x_p",
-    "y_p",
-    "z_p",
-    "ẋ_v",
-    "ẏ_v",
-    "ż_v",
-    "ẋ_p",
-    "ẏ_p",
-    "ż_p",
-    "p",
-    "q",
-    "r",
-    "φ",
-    "θ",
-    "ψ",
-]
-PRINTED_LENGTH = 2.0
-"""l of the point that Appendix F is printed for, m."""
-
-
-def printed_matrices() -> tuple[Array, Array]:
-    """A and B as Appendix F1 prints them."""
-    a, b = np.zeros((18, 18)), np.zeros((18, 4))
-    for i in range(6):
-        a[i, 6 + i] = 1.0
-    for axis, stiffness, damping in ((0, 5.0, 0.0), (1, 5.0, 0.0), (2, 10.0, 1.0)):
-        for row, own, other in ((6 + axis, axis, 3 + axis), (9 + axis, 3 + axis, axis)):
-            a[row, own], a[row, other] = -stiffness, stiffness
-            a[row, own + 6], a[row, other + 6] = -damping, damping
-    a[6, 16], a[7, 15] = 981 / 50, -981 / 50
-    a[15, 12] = a[16, 13] = a[17, 14] = 1.0
-    b[8, 0] = 1 / 10
-    b[12, 1] = b[13, 2] = b[14, 3] = 100.0
-    return a, b
-
-
-LINMOD_A = """
- 0  0   0  0  0   0  1 0  0 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 1  0 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  1 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 1 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 1  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  1 0 0 0       0      0 0
--5  0   0  5  0   0  0 0  0 0 0  0 0 0 0       0 981/50 0
- 0 -5   0  0  5   0  0 0  0 0 0  0 0 0 0 -981/50      0 0
- 0  0 -10  0  0  10  0 0 -1 0 0  1 0 0 0       0      0 0
- 5  0   0 -5  0   0  0 0  0 0 0  0 0 0 0       0      0 0
- 0  5   0  0 -5   0  0 0  0 0 0  0 0 0 0       0      0 0
- 0  0  10  0  0 -10  0 0  1 0 0 -1 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 0 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 1 0 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 0 1 0       0      0 0
- 0  0   0  0  0   0  0 0  0 0 0  0 0 0 1       0      0
-"""
-"""A as Appendix F2 prints it, "result from linmod", copied row by row: the last row ends in our text after
-17 entries, and so does the appendix: of its B there is nothing."""
-
-
-def linmod_matrix() -> tuple[Array, NDArray[np.bool_]]:
-    """A as Appendix F2 prints it, and which of its entries are in our text."""
-    a, there = np.zeros((18, 18)), np.zeros((18, 18), dtype=bool)
-    for i, line in enumerate(LINMOD_A.strip().splitlines()):
-        entries = [float(Fraction(word)) for word in line.split()]
-        a[i, : len(entries)], there[i, : len(entries)] = entries, True
-    return a, there
 
 
 def section(context: Context) -> str:
     """The section's content."""
     context.say("linear model, controllability, poles and gains")
     return "".join((_appendix_f(context), _controllability(context), _poles(context), _gains(context)))
-
-
-def hover_point(vehicle: Vehicle, length: float | None = None) -> Array:
-    """State (18,) of eq. 31 hovering with the load at the origin."""
-    x = np.zeros(second.STATE_SIZE)
-    x[2] = vehicle.hover_length if length is None else length
-    return x
 
 
 def _appendix_f(context: Context) -> str:
@@ -174,59 +103,6 @@ def _appendix_f(context: Context) -> str:
     )
 
 
-def lengths(vehicle: Vehicle) -> tuple[float, float]:
-    """The lengths that the model is linearised at, m: the paper's, and the true equilibrium's."""
-    return PRINTED_LENGTH, vehicle.hover_length
-
-
-def exact_model(vehicle: Vehicle) -> tuple[Rational, Rational]:
-    """A and B at the true equilibrium in rational numbers: every parameter as its decimal fraction."""
-    model = linear_model(vehicle)
-    cable = vehicle.cable
-    k, c, rest = (Fraction(str(v)) for v in (cable.stiffness, cable.damping, cable.rest_length))
-    m_v, m_p, g = (Fraction(str(v)) for v in (vehicle.airframe.mass, vehicle.load.mass, vehicle.gravity))
-    stretch = m_p * g / k
-    string = k * stretch / (rest + stretch)
-    known = [string / m_v, string / m_p, k / m_v, k / m_p, c / m_v, c / m_p, (m_v + m_p) * g / m_v]
-    known += [1 / m_v, Fraction(1), *(1 / Fraction(str(i)) for i in vehicle.airframe.inertia)]
-
-    def exact(value: float) -> Fraction:
-        if value == 0.0:
-            return Fraction(0)
-        nearest = min(known, key=lambda f: abs(float(f) - abs(value)))
-        assert math.isclose(float(nearest), abs(value), rel_tol=1e-12)
-        return nearest if value > 0 else -nearest
-
-    return [[exact(v) for v in row] for row in model.A.tolist()], [
-        [exact(v) for v in row] for row in model.B.tolist()
-    ]
-
-
-def product(a: Rational, b: Rational) -> Rational:
-    """a·b in rational numbers."""
-    columns = list(zip(*b, strict=True))
-    return [
-        [sum((x * y for x, y in zip(row, c, strict=True) if x and y), Fraction(0)) for c in columns]
-        for row in a
-    ]
-
-
-def rank(matrix: Rational) -> int:
-    """Rank by Gaussian elimination in rational numbers: exact."""
-    rows, found = [list(row) for row in matrix], 0
-    for column in range(len(rows[0])):
-        pivot = next((i for i in range(found, len(rows)) if rows[i][column]), None)
-        if pivot is None:
-            continue
-        rows[found], rows[pivot] = rows[pivot], rows[found]
-        for i in range(found + 1, len(rows)):
-            if rows[i][column]:
-                share = rows[i][column] / rows[found][column]
-                rows[i] = [x - share * y for x, y in zip(rows[i], rows[found], strict=True)]
-        found += 1
-    return found
-
-
 def _controllability(context: Context) -> str:
     ledger, vehicle = context.ledger, load_vehicle("paper")
     a, b = exact_model(vehicle)
@@ -279,24 +155,6 @@ def _controllability(context: Context) -> str:
     )
 
 
-def open_loop_modes(vehicle: Vehicle) -> list[tuple[str, complex, int]]:
-    """(meaning, pole with positive imaginary part, how many poles) of the open loop, by theory."""
-    both = 1.0 / vehicle.airframe.mass + 1.0 / vehicle.load.mass
-    cable = vehicle.cable
-    string = cable.stiffness * (1.0 - cable.rest_length / vehicle.hover_length)
-    decay = cable.damping * both / 2.0
-    bounce = complex(-decay, 0.0) + np.emath.sqrt(decay**2 - cable.stiffness * both)
-    return [
-        ("bounce: vehicle and load against each other along the cable", complex(bounce), 2),
-        (
-            "pendulum, in x and in y: vehicle and load against each other sideways",
-            1j * math.sqrt(string * both),
-            4,
-        ),
-        ("drift of the common centre in x, y, z, and of roll, pitch, yaw", 0j, 12),
-    ]
-
-
 def _poles(context: Context) -> str:
     ledger, vehicle = context.ledger, load_vehicle("paper")
     poles = np.linalg.eigvals(linear_model(vehicle).A)
@@ -347,15 +205,6 @@ def _poles(context: Context) -> str:
             "any direction."
         )
     )
-
-
-def gains(vehicle: Vehicle, integral: bool) -> tuple[Array, LinearModel]:
-    """The paper's continuous gain for a vehicle, and the model that it closes the loop on."""
-    model = linear_model(vehicle)
-    if not integral:
-        return continuous_gain(model, paper_lqr_weights()), model
-    augmented = with_integrator(model)
-    return continuous_gain(augmented, paper_weights()), augmented
 
 
 def _gains(context: Context) -> str:
@@ -435,7 +284,7 @@ def _gains(context: Context) -> str:
     return (
         page.heading("Gains and closed-loop poles")
         + page.figure(
-            _draw_poles(np.linalg.eigvals(linear_model(near).A), closed),
+            draw_poles(np.linalg.eigvals(linear_model(near).A), closed),
             "<b>Poles.</b> Open loop and closed loop, the paper's continuous gains; the poles near "
             f"{fastest:.0f} 1/s, from an inertia of 0.01 kg m², lie far to the left of the plot. The bounce "
             f"(at {complex_text(bounce)}) stays.",
@@ -446,39 +295,3 @@ def _gains(context: Context) -> str:
             for key, (k, _) in found.items()
         )
     )
-
-
-def _draw_poles(open_loop: Any, closed: dict[str, Any]) -> bytes:
-    figure, axes = plots.panels(1, height=3.6)
-    ax: Any = axes[0, 0]
-    ax.plot(open_loop.real, open_loop.imag, "x", color=plots.REFERENCE, ms=9, label="open loop, l₀ = 1 m")
-    labels = {
-        "K_lqr": ("LQR, V.A, l₀ = 1 m", "o", plots.VEHICLE),
-        "K_integral.1": ("integral LQR, l₀ = 1 m", "s", plots.LOAD),
-        "K_integral.10": ("integral LQR, V.B, l₀ = 10 m", "^", plots.CABLE),
-    }
-    for key, poles in closed.items():
-        label, marker, colour = labels[key]
-        ax.plot(poles.real, poles.imag, marker, color=colour, mfc="none", label=label)
-    ax.set(xlim=(-4, 0.5), xlabel="real part [1/s]", ylabel="imaginary part [rad/s]")
-    ax.axvline(0.0, color=plots.LIMIT, lw=0.8)
-    ax.legend(fontsize="small", loc="center left")
-    return plots.png(figure)
-
-
-def sorted_poles(poles: Any) -> list[complex]:
-    """Poles from the fastest decay to the slowest."""
-    return sorted((complex(p) for p in poles), key=lambda p: (round(p.real, 9), p.imag))
-
-
-def damping_ratio(pole: complex) -> float:
-    """-Re/|p|; 0 for a pole at the origin."""
-    return -pole.real / abs(pole) + 0.0 if abs(pole) > 0 else 0.0
-
-
-def complex_text(pole: complex) -> str:
-    """A pole (or a pair) in words."""
-    if abs(pole.imag) < 1e-9:
-        return f"{pole.real:.4g}"
-    real = f"{pole.real:.4g} " if abs(pole.real) > 1e-9 else ""
-    return f"{real}± {abs(pole.imag):.4g}j"

@@ -2,67 +2,47 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
 
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots
+from sitl.studies.paper.analysis.hover_noise import (
+    FORCE_STD,
+    HOLD_TIME,
+    held_forces,
+    hover_position,
+    largest_deviations,
+    stationary_std,
+    std_under_white_force,
+)
+from sitl.studies.paper.analysis.linear_model import gains, hover_point
+from sitl.studies.paper.analysis.starts import (
+    BAND,
+    STARTS,
+    largest_difference,
+    noisy_starts,
+    settling_heights,
+)
 from sitl.studies.paper.context import Context
+from sitl.studies.paper.drawings.lqr_hover import draw_heights, draw_noise
 from sitl.studies.paper.flights import Flight, Request
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, REPRODUCED
-from sitl.studies.paper.sections.linear import gains, hover_point
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import load_vehicle
 
 Array = NDArray[np.float64]
 
-BAND = 0.25
-"""What V.A keeps x, y and z within, m."""
-FORCE_STD = 5.0
-"""Standard deviation of the white force on the load, N (docs/paper.md: the paper does not say)."""
-HOLD_TIME = 0.01
-"""s"""
 AGREEMENT = 1e-3
 """Flown at 250 Hz against the paper's continuous law in the second simulation, m."""
-
-
-class Start(NamedTuple):
-    """One of the initial conditions that the text could mean."""
-
-    title: str
-    overrides: tuple[str, ...]
-
-
-STARTS = {
-    "rest_length": Start("Table I, l = l₀ = 1 m at the start", ("initial.vehicle_position=[0, 0, 1]",)),
-    "equilibrium": Start("at the equilibrium, l = 1.981 m", ()),
-    "printed": Start(
-        "at the printed x*, z_v = 2.5, z_p = 0.5 m",
-        ("initial.vehicle_position=[0, 0, 2.5]", "initial.load_position=[0, 0, 0.5]"),
-    ),
-    "long_cable": Start(
-        "l₀ = 10 m with z_v = 2.5, z_p = 0.5 m",
-        (
-            "cable.rest_length=10",
-            "initial.vehicle_position=[0, 0, 2.5]",
-            "initial.load_position=[0, 0, 0.5]",
-        ),
-    ),
-}
 
 
 NOISE = (f"disturbance.force_std={FORCE_STD:g}", "disturbance.acts_on=load")
 HEAVY = ("load.mass=11",)
 """Of the plant alone: heavier than the controller knows."""
-
-
-def noisy_starts(quick: bool) -> dict[str, Start]:
-    """The starts that fly under noise."""
-    return {key: start for key, start in STARTS.items() if key == "equilibrium" or not quick}
 
 
 def requests(quick: bool) -> tuple[list[Request], list[Request], list[Request]]:
@@ -154,7 +134,7 @@ def _figure_8(context: Context) -> str:
     return (
         page.heading("Fig. 8: hover without disturbance")
         + page.figure(
-            _draw_heights(list(STARTS.values()), flights, others),
+            draw_heights(list(STARTS.values()), flights, others),
             "<b>Fig. 8.</b> Flown over the link at 250 Hz (broad), and the paper's continuous law in the "
             "second "
             "simulation (dashed), from each of the starts that the text could mean. The text sets all "
@@ -177,29 +157,6 @@ def _figure_8(context: Context) -> str:
     )
 
 
-def settling_heights(
-    time: Array, vehicle: Array, load: Array, reference: Array, length: float
-) -> dict[str, float]:
-    """How the heights of load and vehicle (n, 3) m settle on the reference (n,) m; length of the cable, m."""
-    deviation = np.abs(load[:, 2] - reference)
-    stretch = np.abs(vehicle[:, 2] - load[:, 2] - length)
-    late = time >= 5.0
-    return {
-        "largest_load_deviation_m": float(deviation.max()),
-        "load_deviation_after_5_s_m": float(deviation[late].max()),
-        "stretch_after_5_s_m": float(stretch[late].max()),
-        "final_load_deviation_m": float(deviation[-1]),
-    }
-
-
-def largest_difference(flight: Flight, other: second.Run) -> float:
-    """Largest distance between the two simulations along any axis, of vehicle and load, m."""
-    n = len(other.time)
-    return float(
-        max(np.abs(flight.load[:n] - other.load).max(), np.abs(flight.vehicle[:n] - other.vehicle).max())
-    )
-
-
 def _figure_9(context: Context) -> str:
     ledger = context.ledger
     context.say(f"figure 9: the same under a white force of {FORCE_STD:g} N on the load")
@@ -212,7 +169,7 @@ def _figure_9(context: Context) -> str:
         other = second.fly_with_noise(vehicle, law(vehicle), held, HOLD_TIME, steps=4)
         others.append(other)
         name = f"figures.9.{key}"
-        hover = _hover_position(flight)
+        hover = hover_position(flight)
         deviations = largest_deviations(flight.load - flight.reference, flight.vehicle - hover)
         ledger.check_array(
             f"{name}.largest_deviation_m",
@@ -263,7 +220,7 @@ def _figure_9(context: Context) -> str:
     return (
         page.heading("Fig. 9: hover with noise on the load")
         + page.figure(
-            _draw_noise(list(starts.values()), flights, others),
+            draw_noise(list(starts.values()), flights, others),
             f"<b>Fig. 9.</b> A white force of {FORCE_STD:g} N standard deviation on each axis of the load, "
             "held for "
             "10 ms. Deviations from hover; red: 0.25 m. The second simulation (dashed) gets the same force.",
@@ -289,45 +246,6 @@ def _figure_9(context: Context) -> str:
             f"{BAND} m at a force of {cautious:.2f} N, two at {bold:.2f} N: “within {BAND} m” fits about 5 N."
         )
     )
-
-
-def held_forces(flight: Flight) -> Array:
-    """The force on the load in each hold time (n, 3), N, read off the log at the first tick in it."""
-    count = round(float(flight.time[-1]) / HOLD_TIME)
-    first = np.searchsorted(flight.time, np.arange(count) * HOLD_TIME - 1e-9)
-    return np.asarray(flight.force_on_load[first])
-
-
-def stationary_std(vehicle: Vehicle) -> Array:
-    """Standard deviations (18,) of the state under the LQR, for a held white force of 1 N on the load."""
-    gain, model = gains(vehicle, integral=False)
-    closed = model.A - model.B @ gain
-    force = np.zeros((18, 3))
-    force[9:12] = np.eye(3) / vehicle.load.mass
-    both = np.zeros((21, 21))
-    both[:18, :18], both[:18, 18:] = closed, force
-    held = linalg.expm(both * HOLD_TIME)
-    covariance = linalg.solve_discrete_lyapunov(held[:18, :18], held[:18, 18:] @ held[:18, 18:].T)
-    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-
-
-def std_under_white_force(vehicle: Vehicle) -> Array:
-    """The same with a white force that is not held, of the held one's spectral density at low frequencies."""
-    gain, model = gains(vehicle, integral=False)
-    force = np.zeros((18, 3))
-    force[9:12] = np.eye(3) / vehicle.load.mass
-    covariance = linalg.solve_continuous_lyapunov(model.A - model.B @ gain, -HOLD_TIME * force @ force.T)
-    return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-
-
-def largest_deviations(load: Array, vehicle: Array) -> list[float]:
-    """Largest of the load's deviations (n, 3) along x, y, z, and of the vehicle's along z, m."""
-    return [*(float(v) for v in np.abs(load).max(axis=0)), float(np.abs(vehicle[:, 2]).max())]
-
-
-def _hover_position(flight: Flight) -> Array:
-    """Where the vehicle hovers above the reference, (n, 3), m."""
-    return np.asarray(flight.reference + np.array([0.0, 0.0, flight.vehicle_description.hover_length]))
 
 
 def _steady_state(context: Context) -> str:
@@ -382,51 +300,3 @@ def _steady_state(context: Context) -> str:
         f"holds it {abs(left):.2f} m too low (statics: {abs(float(sag)):.2f} m).",
         [plain.command, integral.command],
     )
-
-
-def _draw_heights(starts: list[Start], flights: list[Flight], others: list[second.Run]) -> bytes:
-    figure, axes = plots.panels(2, 2, height=2.6)
-    for ax, start, flight, other in zip(axes.flat, starts, flights, others, strict=True):
-        plots.pair(
-            ax,
-            plots.VEHICLE,
-            "vehicle z",
-            (flight.time, flight.vehicle[:, 2]),
-            (other.time, other.vehicle[:, 2]),
-        )
-        plots.pair(ax, plots.LOAD, "load z", (flight.time, flight.load[:, 2]), (other.time, other.load[:, 2]))
-        plots.reference(ax, flight.time, flight.reference[:, 2])
-        ax.set_title(start.title, fontsize="medium")
-        ax.set_ylabel("height z [m]")
-    for ax in axes[1]:
-        ax.set_xlabel("time [s]")
-    plots.shared_legend(figure, axes[0, 0], columns=5)
-    return plots.png(figure)
-
-
-def _draw_noise(starts: list[Start], flights: list[Flight], others: list[second.Run]) -> bytes:
-    figure, axes = plots.panels(3, len(starts), height=1.9, sharex=True)
-    for column, (start, flight, other) in enumerate(zip(starts, flights, others, strict=True)):
-        hover = _hover_position(flight)
-        for axis, label in enumerate("xyz"):
-            ax = axes[axis, column]
-            ends = flight.reference[0], hover[0]
-            for colour, name, ours, theirs, zero in (
-                (plots.VEHICLE, "vehicle", flight.vehicle, other.vehicle, ends[1]),
-                (plots.LOAD, "load", flight.load, other.load, ends[0]),
-            ):
-                plots.pair(
-                    ax,
-                    colour,
-                    name,
-                    (flight.time, ours[:, axis] - zero[axis]),
-                    (other.time, theirs[:, axis] - zero[axis]),
-                )
-            for bound in (-BAND, BAND):
-                ax.axhline(bound, color=plots.LIMIT, lw=1.0, label="0.25 m" if bound > 0 else None)
-            if not column:
-                ax.set_ylabel(f"{label} - hover [m]")
-        axes[0, column].set_title(start.title, fontsize="small")
-        axes[2, column].set_xlabel("time [s]")
-    plots.shared_legend(figure, axes[0, 0], columns=5)
-    return plots.png(figure)

@@ -143,7 +143,7 @@ def _figure(context: Context, key: str, case: Case) -> str:
             if key == "2"
             else _bounce_numbers(context, name, vehicle, ours)
         )
-        picture = _draw_heights(times, ours.states, other.states)
+        picture = draw_heights(times, ours.states, other.states)
     title = f"Fig. {key}" if key.isdigit() else "Beside fig. 12"
     return page.figure(
         picture,
@@ -255,7 +255,7 @@ def driven_oscillation(time: Array, signal: Array, drive: Array) -> tuple[float,
     return natural * math.sqrt(max(0.0, 1.0 - ratio**2)) / (2.0 * math.pi), ratio
 
 
-def _draw_heights(times: Array, ours: Array, other: Array) -> bytes:
+def draw_heights(times: Array, ours: Array, other: Array) -> bytes:
     figure, axes = plots.panels(1, height=3.0)
     ax = axes[0, 0]
     plots.pair(ax, plots.VEHICLE, "vehicle z", (times, ours[:, 2]), (times, other[:, 2]))

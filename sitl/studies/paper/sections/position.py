@@ -13,27 +13,24 @@ from controller.law.control_law import STATE
 from controller.law.reference import Path, circle, setpoint
 from sitl.report.metrics import flight_metrics
 from sitl.studies.paper import independent_simulation as second
-from sitl.studies.paper import offline, page, plots
+from sitl.studies.paper import offline, page
+from sitl.studies.paper.analysis.linear_model import damping_ratio, open_loop_modes
+from sitl.studies.paper.analysis.oscillation import OSCILLATION, bounce_in_flight, rotor_share
+from sitl.studies.paper.analysis.starts import largest_difference
+from sitl.studies.paper.analysis.step import LENGTHS, TARGET, around, law, vehicle_with
 from sitl.studies.paper.context import Context
+from sitl.studies.paper.drawings.position import draw_setpoint
 from sitl.studies.paper.flights import Flight, Request
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
-from sitl.studies.paper.sections.linear import damping_ratio, gains, hover_point, open_loop_modes
-from sitl.studies.paper.sections.lqr_hover import largest_difference
 from sitl.studies.paper.sections.motions import bounce_mode, driven_oscillation
-from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import load_vehicle
 
 Array = NDArray[np.float64]
 
-TARGET = (3.0, 5.0, 2.0)
-"""m"""
 DURATION = 24.0
 """s"""
 AGREEMENT = 0.02
 """Flown, with the gains for 250 Hz, against the paper's continuous gains in the second simulation, m."""
-LENGTHS = ("1", "10")
-"""l₀, m"""
 INITIAL = 5.0
 """The first seconds, in which fig. 10 shows the cable's length oscillate."""
 
@@ -53,17 +50,6 @@ def requests(quick: bool) -> list[Request]:
 def section(context: Context) -> str:
     """The section's content."""
     return _figure_10(context) + _ways_in(context)
-
-
-def vehicle_with(length: str, *more: str) -> Vehicle:
-    """The paper's vehicle on a cable of this l₀, m."""
-    return load_vehicle("paper", [f"cable.rest_length={length}", *more])
-
-
-def law(vehicle: Vehicle, reference: Any, **how: Any) -> second.Law:
-    """The paper's continuous integral LQR, designed for this vehicle; reference: p_ref at a time."""
-    gain, _ = gains(vehicle, integral=True)
-    return second.Law(gain, hover_point(vehicle), np.array([vehicle.hover_thrust, 0, 0, 0]), reference, **how)
 
 
 def _figure_10(context: Context) -> str:
@@ -138,7 +124,7 @@ def _figure_10(context: Context) -> str:
     return (
         page.heading("Fig. 10: to the set-point [3, 5, 2]")
         + page.figure(
-            _draw_setpoint(flights, others),
+            draw_setpoint(flights, others),
             "<b>Fig. 10.</b> The paper's weights, gains designed for the cable that flies. Broad: flown "
             "over the "
             "link at 250 Hz; dashed: the paper's continuous gains in the second simulation. The "
@@ -210,15 +196,6 @@ def _against_the_continuous_design(
         )
 
 
-OSCILLATION = (
-    "largest_deviation_m",
-    "frequency_hz",
-    "bounce_frequency_hz",
-    "damping_ratio",
-    "bounce_damping_ratio",
-)
-
-
 def _initial_oscillation(ledger: Ledger, name: str, flight: Flight, other: second.Run) -> None:
     """Frequency and damping of the cable's length over the first seconds, against the bounce mode."""
     vehicle, name = flight.vehicle_description, f"{name}.initial_oscillation"
@@ -236,36 +213,6 @@ def _initial_oscillation(ledger: Ledger, name: str, flight: Flight, other: secon
     pole = next(p for _, p, _ in open_loop_modes(vehicle))
     ledger.check(f"{name}.bounce_frequency_hz", theory, pole.imag / (2.0 * math.pi), 1e-9, "Hz", "its pole")
     ledger.check(f"{name}.bounce_damping_ratio", ratio, damping_ratio(pole), 1e-9, "", "its pole")
-
-
-def bounce_in_flight(flight: Flight, until: float) -> tuple[Array, Array, Array]:
-    """Time (s), the cable's length less that in hover (m), and what drives it (m/s²), up to a time (s).
-
-    Gravity acts on both ends alike. What is left beside the cable's own force is the thrust's part along the
-    cable, less what it has in hover, and the centrifugal acceleration of the swing.
-    """
-    vehicle = flight.vehicle_description
-    rows = flight.time <= until
-    time, across = flight.time[rows], (flight.vehicle - flight.load)[rows]
-    length = np.linalg.norm(across, axis=1)
-    w, x, y, z = flight.attitude[rows].T
-    up = np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x**2 + y**2)], axis=1)
-    thrust = vehicle.rotors[0].thrust_coefficient * np.sum(flight.rotors[rows] ** 2, axis=1)
-    along = thrust * np.sum(up * across, axis=1) / length
-    rates = np.gradient(across, time, axis=0)
-    swing = np.sum(rates**2, axis=1) - np.gradient(length, time) ** 2
-    drive = (along - vehicle.hover_thrust) / vehicle.airframe.mass + swing / length
-    return time, length - vehicle.hover_length, drive
-
-
-def rotor_share(flight: Flight) -> float:
-    """Largest rotor speed in a flight over the largest there is."""
-    return float(flight.rotors.max() / flight.vehicle_description.rotors[0].max_speed)
-
-
-def around(t: float) -> second.Three:
-    """The paper's circle (V.C) at a time, s."""
-    return (5.0 * math.sin(t), 5.0 * math.cos(t), 5.0)
 
 
 def circle_path(start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Path:
@@ -347,26 +294,3 @@ def _ways_in(context: Context) -> str:
             f"origin: the load ends {float(np.linalg.norm(final)):.2g} m from it, whatever the set-point."
         )
     )
-
-
-def _draw_setpoint(flights: list[Flight], others: list[second.Run]) -> bytes:
-    figure, axes = plots.panels(4, 2, height=1.9, sharex=True)
-    order = [LENGTHS.index("10"), LENGTHS.index("1")]
-    for column, index in enumerate(order):
-        flight, other = flights[index], others[index]
-        for axis, label in enumerate("xyz"):
-            ax = axes[axis, column]
-            for colour, name, ours, theirs in (
-                (plots.VEHICLE, "vehicle", flight.vehicle, other.vehicle),
-                (plots.LOAD, "load", flight.load, other.load),
-            ):
-                plots.pair(ax, colour, name, (flight.time, ours[:, axis]), (other.time, theirs[:, axis]))
-            plots.reference(ax, flight.time, flight.reference[:, axis])
-            ax.set_ylabel(f"{label} [m]")
-        ax = axes[3, column]
-        lengths = [np.linalg.norm(run.vehicle - run.load, axis=1) for run in (flight, other)]
-        plots.pair(ax, plots.CABLE, "cable length", (flight.time, lengths[0]), (other.time, lengths[1]))
-        ax.set(xlabel="time [s]", ylabel="cable length [m]")
-        axes[0, column].set(title=f"l₀ = {LENGTHS[index]} m", xlim=(0, 15))
-    plots.shared_legend(figure, axes[0, 0], columns=5)
-    return plots.png(figure)

@@ -14,10 +14,10 @@ from controller.design.lqr import Weights, continuous_gain
 from controller.design.model import LinearModel, linear_model, with_integrator
 from sitl.studies.paper import independent_simulation as second
 from sitl.studies.paper import page, plots
+from sitl.studies.paper.analysis.linear_model import hover_point
+from sitl.studies.paper.analysis.step import TARGET, law, vehicle_with
 from sitl.studies.paper.context import Context
 from sitl.studies.paper.record import REPRODUCED
-from sitl.studies.paper.sections.linear import hover_point
-from sitl.studies.paper.sections.position import TARGET, law, vehicle_with
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
