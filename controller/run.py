@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from controller.law.state import Array
     from controller.own_law.find import ChosenLaw
     from controller.own_law.pilot import OwnLawPilot
-    from controller.pilot.ground_link import GroundOptions
+    from controller.pilot.ground_options import GroundOptions
     from controller.pilot.ground_session import Guided
 
 
@@ -163,7 +163,7 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
 
 def _ground(options: ControllerOptions) -> GroundOptions:
     """With the flight's folder, whose logs clients may read."""
-    from controller.pilot.ground_link import GroundOptions
+    from controller.pilot.ground_options import GroundOptions
 
     return replace(options.ground or GroundOptions(), logs=options.out)
 

@@ -1,12 +1,9 @@
-"""A controller's links to ground control: a station, its sockets, and what they are started with."""
+"""A controller's links to ground control: a station and its sockets."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import NamedTuple
 
 from controller.ground.link.peers import Address
 from controller.ground.link.signing import Signing, read_key
@@ -14,31 +11,11 @@ from controller.ground.link.sockets import GroundSockets
 from controller.ground.parameters.file import ParameterFile
 from controller.ground.station import ONBOARD_LINK, STATION_LINK, Station, local_ports, standard_peers
 from controller.ground.telemetry.vehicle_state import profile_of
+from controller.pilot.ground_options import GroundOptions, Ports
 from controller.pilot.log_folder import LogFolder
 from sitl_bridge.vehicle.description import Vehicle
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-
-
-class Ports(NamedTuple):
-    """UDP ports of one link."""
-
-    local: int
-    peer: int
-    """On this machine, whom the link speaks to first."""
-
-
-@dataclass(frozen=True)
-class GroundOptions:
-    """How ground control reaches a vehicle. Ports that are None are PX4's."""
-
-    stations: Ports | None = None
-    onboard: Ports | None = None
-    signing_key: Path | None = None
-    parameters: Path | None = None
-    exposed: bool = False
-    logs: Path | None = None
-    """The folder of the flight's logs, which clients may read"""
 
 
 class GroundLink:

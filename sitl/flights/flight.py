@@ -265,7 +265,8 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
         if options.in_process:
             outcome = _fly_here(options, stop, lambda event: display.show(status(event)), display.say)
         else:
-            pair = Pair(*options.command_lines(), display.messages)
+            pair = Pair(*options.command_lines(), display.messages, forked=options.law is None)
+            display.forward()
             outcome = watch(pair, stop, lambda event: display.show(status(event)))
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)

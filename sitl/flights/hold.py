@@ -17,7 +17,7 @@ from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
-    from controller.pilot.ground_link import GroundOptions
+    from controller.pilot.ground_options import GroundOptions
 
 
 def ground_arguments(options: GroundOptions) -> list[str]:
@@ -48,7 +48,8 @@ def hold(options: FlightOptions, stop: StopRequest) -> str | None:
         options.out.mkdir(parents=True, exist_ok=True)
         clear(options.out)
     with Display() as display:
-        pair = Pair(*options.command_lines(), display.messages)
+        pair = Pair(*options.command_lines(), display.messages, forked=options.law is None)
+        display.forward()
         outcome = watch(pair, stop, lambda event: display.show(status_of(event)))
     failure = None if stop else outcome.failure
     if options.out is not None:

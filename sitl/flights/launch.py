@@ -8,12 +8,12 @@ import os
 import selectors
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import IO, Any
 
+from sitl.flights.child import Child, Forked, can_fork, launched
 from sitl_bridge.process import FLIGHT_OVER, StopRequest
 
 PATIENCE = 60.0
@@ -44,19 +44,24 @@ class Outcome:
 class Pair:
     """Plant and controller as child processes, which end when this process does."""
 
-    def __init__(self, plant: Sequence[str], controller: Sequence[str], messages: int | None = None) -> None:
-        """messages: file descriptor for what they say to people; None: standard error."""
+    def __init__(
+        self,
+        plant: Sequence[str],
+        controller: Sequence[str],
+        messages: int | None = None,
+        forked: bool = False,
+    ) -> None:
+        """messages: file descriptor for what they say to people; None: standard error.
+
+        forked: as copies of this process, if they can be: for a process that has little beside the product.
+        """
         self.launched_at = time.time()
-        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        self.processes: dict[str, Child] = {}
+        make = Forked if forked and can_fork() else launched
         # The controller takes longer to start: it goes first. Each ends when its standard input does,
         # so that nothing is left running even if this process is killed.
         for name, arguments in (("controller", controller), ("plant", plant)):
-            self.processes[name] = subprocess.Popen(
-                [sys.executable, "-m", "sitl", name, *arguments, "--until-eof"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=messages,
-            )
+            self.processes[name] = make([name, *arguments, "--until-eof"], messages)
 
     def ended(self) -> str | None:
         """The name of a process that has ended, if one has."""
@@ -88,7 +93,7 @@ class Pair:
                 child.wait()
 
 
-def how_it_ended(child: subprocess.Popen[bytes]) -> str:
+def how_it_ended(child: Child) -> str:
     """The way a process ended, in words."""
     code = child.returncode
     if code is not None and code < 0:
@@ -139,7 +144,7 @@ def watch(pair: Pair, stop: StopRequest, show: Callable[[dict[str, Any]], None])
 class _Events:
     """The events on a process' standard output."""
 
-    def __init__(self, child: subprocess.Popen[bytes]) -> None:
+    def __init__(self, child: Child) -> None:
         assert child.stdout is not None
         self.stream: IO[bytes] = child.stdout
         self._rest = b""

@@ -148,6 +148,7 @@ def fly_over(options: OverFlight, stop: StopRequest) -> tuple[dict[str, Any], Pa
     account = Account()
     with Display() as display:
         children = Children(*options.command_lines(out, truth_port, load_port), display.messages)
+        display.forward()
         children.watch(account, stop, lambda event: display.show(status(event)))
     if account.failure:
         print(f"fly: {account.failure}", file=sys.stderr, flush=True)

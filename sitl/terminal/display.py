@@ -42,7 +42,8 @@ def live_table(status: Status, width: int) -> Table:
 class Display:
     """Shows a status again and again, and lines in between. A context: on leaving, the terminal is as before.
 
-    On a terminal, child processes write their messages to `messages`, so that they stand above the table.
+    On a terminal, child processes write their messages to `messages`, so that they stand above the table:
+    see `forward`.
     """
 
     def __init__(self, stream: IO[str] | None = None) -> None:
@@ -51,6 +52,7 @@ class Display:
         self._last: Status | None = None
         self._console: Console | None = None
         self._live: Live | None = None
+        self._reading: int | None = None
         self._reader: threading.Thread | None = None
         self.messages: int | None = None
         """File descriptor for the standard error of child processes; None: they have ours."""
@@ -60,10 +62,18 @@ class Display:
             from rich.console import Console
 
             self._console = Console(file=self._stream, markup=False, highlight=False, emoji=False)
-            reading, self.messages = os.pipe()
-            self._reader = threading.Thread(target=self._forward, args=(reading,), daemon=True)
-            self._reader.start()
+            self._reading, self.messages = os.pipe()
         return self
+
+    def forward(self) -> None:
+        """From now on print the messages of child processes, once they are launched.
+
+        Not before: a process with a thread cannot be forked.
+        """
+        if self._reading is not None:
+            self._reader = threading.Thread(target=self._forward, args=(self._reading,), daemon=True)
+            self._reading = None
+            self._reader.start()
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
@@ -94,6 +104,9 @@ class Display:
         if self.messages is not None:
             os.close(self.messages)
             self.messages = None
+        if self._reading is not None:
+            os.close(self._reading)
+            self._reading = None
         if self._reader is not None:
             self._reader.join(timeout=1.0)
             self._reader = None
