@@ -139,4 +139,4 @@ def test_ctrl_c_between_two_processes_leaves_whole_messages_and_no_empty_figures
     assert sum("tension" in line for line in lines) == 1
     assert any(line.startswith("plant: stopped by ") for line in lines)
     assert any(line.startswith("  outcome") and "INTERRUPTED" in line for line in lines)
-    assert not re.search("settling|overshoot|steady|rms", shown)
+    assert not re.search(r"settling|overshoot|steady|\brms", shown)
