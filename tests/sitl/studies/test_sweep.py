@@ -169,6 +169,19 @@ def test_sixty_random_vehicles_fly_steps_of_every_length() -> None:
     assert max(row["overshoot_pct"] or 0.0 for row in rows) <= 10.0
 
 
+@pytest.mark.parametrize("name", ["random-circles", "random-figure-eights", "random-helices"])
+def test_random_vehicles_fly_paths_or_are_refused_with_a_figure(name: str) -> None:
+    """The beginning of three studies, shorter flights: no fall, and nothing flown far from its path."""
+    full = load_study(STUDIES / f"{name}.toml")
+    study = {**full.model_dump(mode="json"), "duration": 25.0}
+    rows = [fly_draw(study, draw.inputs, None) for draw in draws(full)[:6]]
+    assert {row["outcome"] for row in rows} <= {"settled", "did not settle", "refused"}, rows
+    flown = [row for row in rows if row["outcome"] != "refused"]
+    assert len(flown) >= 3
+    assert max(row["tracking_rms_m"] for row in flown) <= 0.05
+    assert all("reference.angular_rate" in row["outcome_cause"] for row in rows if row not in flown)
+
+
 @pytest.mark.parametrize("number", [10014, 10069, 10032])
 def test_long_cables_fly_on_their_sensors(number: int) -> None:
     """On 21 to 48 m the estimate's first errors, metres of the load, asked for more than 90 degrees."""
