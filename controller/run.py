@@ -12,7 +12,7 @@ from controller.design.names import FOR_ESTIMATES
 from controller.feedback.truth import Feedback, PathFrom, estimates
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
-from controller.pilot.stall_clock import AwakeClock
+from controller.pilot.stall_clock import StallFreeClock
 from controller.pilot.terms_log import TermsLog
 from sitl_bridge.event_log import EventLog
 from sitl_bridge.log_amount import Logs
@@ -202,7 +202,7 @@ def _loop(
 ) -> None:
     session, guided, own_law = opened.hil, opened.guided, opened.own_law
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
-    clock = AwakeClock(time.monotonic())
+    clock = StallFreeClock(time.monotonic())
     now = time.monotonic()
     mode = ""
     while stop.reason is None and (most_steps is None or session.steps < most_steps):
@@ -221,7 +221,7 @@ def _loop(
         if own_law is not None and own_law.failure is not None:  # the plant has been told: rotors stopped
             return
         # After the answer: the plant does not wait for ground control.
-        if guided is not None and guided.exchange(now, heard=received is not None):
+        if guided is not None and guided.serve(now, heard=received is not None):
             for datagram in guided.to_plant(now):
                 link.send(datagram)
             if guided.mode_title != mode:

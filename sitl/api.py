@@ -28,7 +28,7 @@ from sitl.flights.scenario import (
     usual_feedback,
     with_agility,
 )
-from sitl.json_values import plain
+from sitl.json_values import to_json
 from sitl.report.metrics import flight_metrics, reference_positions
 from sitl.report.outcome import judge
 from sitl.report.sensing_error import sensing_error
@@ -199,7 +199,7 @@ def _summary(
         summary |= flight_metrics(states["time_s"], load, reference, seen)
         summary["settled"] = bool(summary["settled"] and facts["completed"])
         summary |= judge(states, reference, told, summary)._asdict()
-    return {key: plain(value) for key, value in summary.items()}
+    return {key: to_json(value) for key, value in summary.items()}
 
 
 def _written(

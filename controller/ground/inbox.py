@@ -69,7 +69,7 @@ class Inbox:
         self._peers = peers
         self._clock = clock
 
-    def take(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
+    def dispatch(self, message: Any, frame: Frame, peer: Peer, now: float) -> None:
         """A message from a peer; what is for nobody here is left."""
         number = frame.message_id  # not message.id: some messages have a field of that name
         if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT and message.type == mavlink.MAV_TYPE_GCS:

@@ -164,7 +164,7 @@ class Station:
         if message is None:
             self.dropped += 1
             return
-        self._inbox.take(message, frame, peer, now)
+        self._inbox.dispatch(message, frame, peer, now)
 
     def _takes(self, frame: Frame, now: float) -> bool:
         if frame.version == 2 and frame.raw[2] & ~FLAG_SIGNED:
@@ -182,7 +182,7 @@ class Station:
 
     def hear_plant(self, frame: Frame, now: float) -> None:
         """What the plant says: the load's own messages, and answers to what was passed on to it."""
-        if self._load.take(frame, now):
+        if self._load.accept(frame, now):
             self._due = now
         elif frame.message_id == mavlink.MAVLINK_MSG_ID_COMMAND_ACK:
             message = decoded(frame)

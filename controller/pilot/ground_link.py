@@ -70,11 +70,11 @@ class GroundLink:
             f"MAVSDK and companions: this end {host}:{onboard.local}, listen on udpin://{LOOPBACK}:{onboard.peer}"
         )
 
-    def exchange(self, now: float) -> None:
+    def serve(self, now: float) -> None:
         """Take in what has come, send what is due."""
         if self._signing is not None:
             self._signing.keep_time(now, time.time())
-        self._sockets.exchange(self.station, now)
+        self._sockets.serve(self.station, now)
 
     def close(self) -> None:
         """Free the ports."""

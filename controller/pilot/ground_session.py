@@ -72,7 +72,7 @@ class Guided:
         messages = self._link.station.plant_commands.to_plant(now)
         return [self._packer.pack(message) for message in messages]
 
-    def exchange(self, now: float, heard: bool) -> bool:
+    def serve(self, now: float, heard: bool) -> bool:
         """Serve ground control, if it is time to; `heard`: whether the plant has just said something.
 
         Returns whether it was: else nothing is different from the last time.
@@ -82,7 +82,7 @@ class Guided:
         self._next_look = now + LOOK_PERIOD
         if not heard and self._pilot is not None:
             self._pilot.wait(now)
-        self._link.exchange(now)
+        self._link.serve(now)
         return True
 
     def close(self) -> None:

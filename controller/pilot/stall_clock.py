@@ -6,7 +6,7 @@ STALL = 0.1
 """s, by which waking up late counts as a stall"""
 
 
-class AwakeClock:
+class StallFreeClock:
     """Monotonic time less the stalls. No I/O: it is told the time."""
 
     def __init__(self, monotonic: float) -> None:

@@ -44,7 +44,7 @@ class Checked(NamedTuple):
     spread: float
     verdict: Verdict
 
-    def plain(self) -> dict[str, float | str | None]:
+    def to_json(self) -> dict[str, float | str | None]:
         """For JSON."""
         bound = "at_least" if self.limit.at_least else "at_most"
         measured = self.verdict != "not measured"

@@ -312,7 +312,7 @@ def _bench(arguments: argparse.Namespace) -> int:
         return 0
     checked = check_all(samples)
     if arguments.json:
-        print(json.dumps({row.limit.key: row.plain() for row in checked}, indent=2))
+        print(json.dumps({row.limit.key: row.to_json() for row in checked}, indent=2))
     else:
         print(check_table(checked))
     return FAILED if any(row.verdict == "missed" for row in checked) else 0

@@ -15,7 +15,7 @@ from controller.feedback.log import COVARIANCE_NAME, ESTIMATE_NAME
 from controller.law.reference import Path as ReferencePath
 from controller.pilot.terms_log import FILE_NAME as TERMS_NAME
 from sitl.export.mcap import FILE_NAME as MCAP_NAME
-from sitl.json_values import plain
+from sitl.json_values import to_json
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
 from sitl.report.html_report import FILE_NAME as HTML_NAME
 from sitl.report.metrics import Metrics, flight_metrics, reference_positions
@@ -129,7 +129,7 @@ def write_report(
         summary["state_log"] = str(state_log)
         summary["state_log_sha256"] = hashlib.sha256(state_log.read_bytes()).hexdigest()
     summary["settled"] = bool(summary["settled"] and facts.get("completed"))
-    summary = {key: plain(value) for key, value in summary.items()}  # a flight that diverged has no figures
+    summary = {key: to_json(value) for key, value in summary.items()}  # a flight that diverged has no figures
     write_summary(out, summary)
     return summary
 

@@ -9,7 +9,7 @@ from controller.design.motion.ramp import planned
 from sitl.api import fly
 from sitl.flights.refusals import check_feasible
 from sitl.flights.scenario import Hover, Scenario, Setpoint, scenario_vehicle
-from sitl.json_values import plain
+from sitl.json_values import to_json
 from sitl.vehicles.figures import Figures, figures
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -54,7 +54,7 @@ class Checked(NamedTuple):
             "refusals": self.refusals,
             "step": None if self.step is None else self.step._asdict(),
         }
-        return {key: plain(value) for key, value in content.items()}
+        return {key: to_json(value) for key, value in content.items()}
 
 
 def check(vehicle: Vehicle, rate_hz: float, length: float, feedback: str) -> Checked:

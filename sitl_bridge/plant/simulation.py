@@ -34,7 +34,7 @@ from sitl_bridge.plant.stages import (
     run,
     ticks_left,
 )
-from sitl_bridge.plant.tick import NO_DATAGRAM, exchange
+from sitl_bridge.plant.tick import NO_DATAGRAM, fly_whole_tick
 from sitl_bridge.plant.wire.answers import AnswerReader
 from sitl_bridge.plant.wire.messages import TRUTH, TickWriter
 from sitl_bridge.plant.wire.slow_frames import LoadOnMap, SlowFrames
@@ -157,7 +157,7 @@ class Simulation:
         self._due_rules = due_rules(stages)
         self._counts = [stage.count for stage in stages if stage.count is not None]
         table = None if recorder is None else recorder.table
-        self._exchange = exchange.bind(
+        self._fly_whole_tick = fly_whole_tick.bind(
             *self.answers.arrays,
             self.world.record,
             np.zeros((CHUNK_ROWS, WIDTH)) if table is None else table,
@@ -265,7 +265,7 @@ class Simulation:
         self._commands = commands
         run(self._flying[1:])
 
-    def exchange(self, datagram: bytes) -> bool:
+    def fly_whole_tick(self, datagram: bytes) -> bool:
         """Fly the current tick and have the next one's frames ready, in one go: True.
 
         Only if the datagram is the armed answer to the tick and nothing else is due; where this returns False
@@ -281,7 +281,7 @@ class Simulation:
         """The compiled tick on the datagram of this length, or on the commands as they are (NO_DATAGRAM)."""
         recorder, tick = self._recorder, self.tick + 1
         next_time_usec = self._time_usec(tick)
-        size = self._exchange(
+        size = self._fly_whole_tick(
             length,
             self.time_usec,
             next_time_usec,

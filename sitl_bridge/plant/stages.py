@@ -1,10 +1,10 @@
 """A tick as a list of named stages, each with the rule that says when it is due.
 
 `Simulation` has the list, in the order in which things happen. A tick is flown in one of two ways, with the
-same states, rows and bytes: stage by stage, in Python, or whole, in the one compiled call of `tick.exchange`,
-which does what every tick needs. Whatever else a stage does now and then (draw random numbers, apply a fault,
-read GPS), its due rule announces. The whole tick is taken only while no stage is due, so an effect cannot be
-skipped because a forecast elsewhere does not know of it: a stage without a due rule cannot be built.
+same states, rows and bytes. Stage by stage, in Python; or whole, in one compiled call
+(`tick.fly_whole_tick`), which does what every tick needs. What a stage does only now and then (draw random
+numbers, apply a fault, read GPS) is announced by its due rule. The whole tick is taken only while no stage is
+due. A stage without a due rule cannot be built, so no effect can be skipped by mistake.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ _write_tick = messages.write_tick.python
     int,
     float,
 )
-def exchange(
+def fly_whole_tick(
     inboxes: Any,
     answer_payload: Bytes,
     worlds: Any,

@@ -55,13 +55,13 @@ def flight(
     simulation.record_with(log)
     flown_whole = 0
 
-    def exchange(datagram: bytes) -> bool:
+    def fly_whole_tick(datagram: bytes) -> bool:
         nonlocal flown_whole
-        flown = whole and Simulation.exchange(simulation, datagram)
+        flown = whole and Simulation.fly_whole_tick(simulation, datagram)
         flown_whole += flown
         return flown
 
-    simulation.exchange = exchange  # type: ignore[method-assign]
+    simulation.fly_whole_tick = fly_whole_tick  # type: ignore[method-assign]
     feedback = EstimateFeedback(vehicle, RATE_HZ) if on_estimate else TruthFeedback()
     session = new_session(
         lambda controls: Autopilot(

@@ -12,11 +12,11 @@ from controller.ground.station import Station
 from sitl_bridge.mavlink.framing import Frame
 
 MOST_DATAGRAMS = 8
-"""Datagrams read from a link in one exchange"""
+"""Datagrams read from a link in one call"""
 MOST_BYTES = 2048
 """Bytes taken of a datagram; no client packs more frames into one, and what is beyond is lost"""
 FRAMES_AT_ONCE = 16
-"""Frames of a link taken in one exchange: a flood waits in the socket, not in front of the control loop"""
+"""Frames of a link taken in one call: a flood waits in the socket, not in front of the control loop"""
 
 
 class BindError(ValueError):
@@ -33,7 +33,7 @@ class GroundSockets:
             )
         self.sockets: list[socket.socket] = []
         self._waiting: list[deque[tuple[Frame, Address]]] = [deque() for _ in ports]
-        """Of each link, the frames of its last datagram that wait for the next exchange"""
+        """Of each link, the frames of its last datagram that wait for the next call"""
         try:
             for port in ports:
                 link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -44,7 +44,7 @@ class GroundSockets:
             self.close()
             raise
 
-    def exchange(self, station: Station, now: float) -> None:
+    def serve(self, station: Station, now: float) -> None:
         """Take in what has come, send what is due. Never blocks, and never fails for a peer that is gone."""
         for index in range(len(self.sockets)):
             self._take_in(index, station, now)
@@ -53,7 +53,7 @@ class GroundSockets:
                 self.sockets[address.link].sendto(datagram, (address.host, address.port))
 
     def _take_in(self, index: int, station: Station, now: float) -> None:
-        """Hand over what has come on a link, as much of it as one exchange may cost."""
+        """Hand over what has come on a link, as much of it as one call may cost."""
         waiting = self._waiting[index]
         datagrams = frames = 0
         while frames < FRAMES_AT_ONCE:

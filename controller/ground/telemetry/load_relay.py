@@ -28,7 +28,7 @@ class LoadRelay:
         self._latest: dict[int, tuple[Packed, float]] = {}
         self._sent: dict[tuple[Address, int], float] = {}
 
-    def take(self, frame: Frame, now: float) -> bool:
+    def accept(self, frame: Frame, now: float) -> bool:
         """A frame from the plant; whether it was the load's and is to be passed on."""
         if frame.system != self._profile.load_system or frame.message_id not in _RATES:
             return False

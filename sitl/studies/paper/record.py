@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
-from sitl.json_values import plain
+from sitl.json_values import to_json
 
 REPRODUCED = "reproduced"
 CORRECTED = "reproduced with a correction"
@@ -71,7 +71,7 @@ class Ledger:
             place = place[int(step)] if isinstance(place, list) else place.setdefault(step, {})
         if name in place:
             raise ValueError(f"{key} is recorded twice")
-        place[name] = plain(value)
+        place[name] = to_json(value)
 
     def check(
         self, key: str, value: float, expected: float, tolerance: float, unit: str = "", source: str = ""
@@ -131,8 +131,8 @@ class Ledger:
     ) -> Any:
         self._place(key, value)
         self.checks[key] = {
-            "value": plain(value),
-            "expected": plain(expected),
+            "value": to_json(value),
+            "expected": to_json(expected),
             "relation": relation,
             "tolerance": tolerance,
             "verdict": verdict,

@@ -157,7 +157,7 @@ class Lockstep:
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the autopilot."""
         at_once = self._state is State.WAITING and self._repeats == 0
-        if at_once and self._on_silence == "wait" and self.simulation.exchange(datagram):
+        if at_once and self._on_silence == "wait" and self.simulation.fly_whole_tick(datagram):
             self._answered(now)
             return
         answer = self._receiver

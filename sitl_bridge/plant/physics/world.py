@@ -163,7 +163,7 @@ class World:
         return self._force.next_step, self._wind.next_step
 
     def count_tick(self) -> None:
-        """A tick was flown by `tick.exchange`."""
+        """A tick was flown by `tick.fly_whole_tick`."""
         if not self._force.constant:
             self._force.count(self.steps_per_tick)
         if not self._wind.constant:

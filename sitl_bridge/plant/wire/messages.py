@@ -279,7 +279,7 @@ class TickWriter:
         fields["geodesy"] = [*origin.home, *origin.degrees_per_metre]
         payloads = outbox.view(np.uint8)[_MESSAGES_AT : _MESSAGES_AT + OUTGOING.itemsize]
         self.arrays = (outbox, payloads)
-        """What `tick.exchange` needs of the writer, in its order, as it changes."""
+        """What `tick.fly_whole_tick` needs of the writer, in its order, as it changes."""
         self._write = write_tick.bind(*self.arrays, *world.sensed())
         self.state = Paced(fields["state_pace"])
         """When HIL_STATE_QUATERNION goes out."""

@@ -64,7 +64,7 @@ class CountedSimulation:
         self.done.append([(command.step, command.controls[:4].tolist()) for command in commands])
         self.tick += 1
 
-    def exchange(self, datagram: bytes) -> bool:
+    def fly_whole_tick(self, datagram: bytes) -> bool:
         if self.may_exchange:
             self.done.append("exchanged")
             self.tick += 1

@@ -263,7 +263,7 @@ def test_one_exchange_takes_so_many_frames_and_leaves_the_rest_to_the_next() -> 
         client.sendto(frames[0], links.sockets[1].getsockname())
         for _ in range(len(frames)):
             taken.append(0)
-            links.exchange(rig.station, rig.now)
+            links.serve(rig.station, rig.now)
     links.close()
     assert max(taken) <= FRAMES_AT_ONCE + 1  # of one link, and the other's one
     assert taken[0] == FRAMES_AT_ONCE + 1

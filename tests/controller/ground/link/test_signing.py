@@ -144,7 +144,7 @@ def test_a_links_time_stamps_are_the_time_of_day(tmp_path: Path) -> None:
         ports = Ports(0, client.getsockname()[1])
         options = GroundOptions(ports, Ports(0, 9), key)
         link = GroundLink(load_vehicle("iris"), 0, options, lambda text: None)
-        link.exchange(time.monotonic() + 600.0)  # the loop's clock is another one
+        link.serve(time.monotonic() + 600.0)  # the loop's clock is another one
         raw = client.recv(2048)
         link.close()
     stamp = int.from_bytes(raw[-12:-6], "little") / TICKS + EPOCH
