@@ -1,17 +1,32 @@
-"""Parquet files of numbers, written in the background in chunks, so that a tick never waits for a disk."""
+"""Parquet files of numbers, written in the background in chunks, so that a tick never waits for a disk.
+
+A process that has to stay small (`write_apart`) keeps rows as they are in a file without a name, and has
+another process make Parquet of them: at the end, or in time before that file gets large.
+"""
 
 from __future__ import annotations
 
 import queue
+import tempfile
 import threading
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sitl_bridge.parquet import Array, HereFile, ParquetFile, Writer
+
+MOST_SPOOLED = 64_000_000
+"""Bytes of rows that wait for the end of a flight: some 15 minutes."""
+
+_apart: Writer | None = None
+
+
+def write_apart() -> None:
+    """From now on leave Parquet to a process of its own: a plant or a controller does without Arrow."""
+    global _apart
+    _apart = Writer()
 
 
 class RowLog:
@@ -23,7 +38,7 @@ class RowLog:
     def __init__(self, path: Path, names: Sequence[str], single: Collection[str] = ()) -> None:
         """names: of the columns; single: of those among them that are kept in single precision."""
         self.path = path
-        self._types = {name: np.float32 if name in single else np.float64 for name in names}
+        self._columns = {name: name in single for name in names}
         self._chunks: queue.SimpleQueue[Array | None] = queue.SimpleQueue()
         self._failure: Exception | None = None
         self._writer = threading.Thread(target=self._write_chunks, name=path.name, daemon=True)
@@ -41,19 +56,57 @@ class RowLog:
             raise self._failure
 
     def _write_chunks(self) -> None:
+        closed = False
         try:
-            import pyarrow as pa
-            import pyarrow.parquet as pq
-
-            schema = pa.schema([(name, pa.from_numpy_dtype(kind)) for name, kind in self._types.items()])
-            # Doubles split into streams of bytes: those of sign and exponent hardly change.
-            options = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True}
-            with pq.ParquetWriter(self.path, schema, **options) as writer:
+            file = _opened(self.path, self._columns)
+            try:
                 while (chunk := self._chunks.get()) is not None:
-                    columns = zip(chunk.T, self._types.values(), strict=True)
-                    arrays: list[Any] = [pa.array(np.ascontiguousarray(c, kind)) for c, kind in columns]
-                    writer.write_table(pa.table(arrays, schema=schema))
+                    file.write(chunk)
+                closed = True
+            finally:
+                file.close()
         except Exception as error:  # handed to the main thread by `close`
             self._failure = error
-            while self._chunks.get() is not None:
+            while not closed and self._chunks.get() is not None:
                 pass
+
+
+def _opened(path: Path, columns: dict[str, bool]) -> ParquetFile:
+    return HereFile(path, columns) if _apart is None else _Spooled(_apart, path, columns)
+
+
+class _Spooled:
+    """Chunks wait in a file without a name, which nothing is left of even if this process is killed."""
+
+    def __init__(self, writer: Writer, path: Path, columns: dict[str, bool]) -> None:
+        self._writer, self._path, self._columns = writer, path, columns
+        # Open for as long as the log is.
+        self._spool: IO[bytes] | None = tempfile.TemporaryFile(dir=path.parent)  # noqa: SIM115
+        self._lengths: list[int] = []
+        self._file: ParquetFile | None = None
+
+    def write(self, chunk: Array) -> None:
+        if self._file is not None:
+            self._file.write(chunk)
+            return
+        assert self._spool is not None
+        self._spool.write(np.ascontiguousarray(chunk).tobytes())
+        self._lengths.append(len(chunk))
+        if self._spool.tell() > MOST_SPOOLED:
+            self._hand_over()
+
+    def close(self) -> None:
+        self._hand_over().close()
+
+    def _hand_over(self) -> ParquetFile:
+        if self._file is None:
+            assert self._spool is not None
+            self._file = self._writer.file(self._path, self._columns)
+            self._spool.seek(0)
+            width = len(self._columns)
+            for length in self._lengths:
+                content = self._spool.read(8 * length * width)
+                self._file.write(np.frombuffer(content).reshape(length, width))
+            self._spool.close()
+            self._spool = None
+        return self._file

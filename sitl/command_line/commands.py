@@ -133,7 +133,9 @@ def _plant(arguments: argparse.Namespace) -> int:
     hil = _hil_address(arguments, "udpout")
     timing = _timing(arguments, AS_PX4_EXPECTS if hil.kind == "tcpin" else Timing("realtime", None))
     from sitl_bridge.plant.run import PlantOptions, run
+    from sitl_bridge.rowlog import write_apart
 
+    write_apart()
     speaker = Speaker("plant", events=arguments.until_eof)
     stop = StopRequest()
     stop.install(watch_stdin=arguments.until_eof)
@@ -183,6 +185,7 @@ def _control(
     from sitl.flights.hold import check_design
     from sitl.flights.refusals import check_feasible
     from sitl.flights.scenario import GroundControl, Hover, usual_feedback
+    from sitl_bridge.rowlog import write_apart
 
     law = chosen_law(arguments, scenario)
     if arguments.over is not None:
@@ -190,6 +193,7 @@ def _control(
 
         return run_over(arguments, vehicle, scenario)
     keep_on_disk()
+    write_apart()
     check_feasible(scenario, vehicle, arguments.design)
     if law is not None:
         from controller.own_law.find import make
