@@ -77,6 +77,9 @@ def test_a_finished_flight_is_played_and_paused(flight: Path, page: Page) -> Non
             assert until_moving(page)
             seen = picture(page)
             if PICTURES:
+                for close in page.locator("button.mantine-Notification-closeButton").all():
+                    close.click()  # a remark on software rendering
+                page.wait_for_timeout(1000)
                 page.screenshot(path=Path(PICTURES) / "view.png")
             assert len(np.unique(seen.reshape(-1, seen.shape[-1]), axis=0)) > 20  # not blank
             page.get_by_role("checkbox", name="Play").click(force=True)
