@@ -24,6 +24,7 @@ from controller.over.load.filtered import load_source
 from controller.over.load.source import TruthSource
 from controller.over.stack import Stack
 from controller.over.states import State, Step
+from sitl_bridge.event_log import EventLog
 from sitl_bridge.mavlink.framing import split
 from sitl_bridge.mavlink.links.address import Address
 from sitl_bridge.mavlink.links.link import Link
@@ -100,6 +101,7 @@ class Report:
         changed = flight.state is not self._state
         if changed:
             self._state = flight.state
+            self._speaker.note("mode", flight.state.value)
             plant_time = None if self._plant is None else self._plant.time_s
             self._speaker.event(
                 "phase", phase=flight.state.name.lower(), plant_time_s=plant_time, unix_time_s=time.time()
@@ -189,6 +191,8 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
     )
     companion = Companion(flight, options.wait_s)
     report = Report(flight, plant, speaker)
+    if options.out is not None:
+        speaker.keep(EventLog(options.out), lambda: flight.last_step and flight.last_step.time_s)
     speaker.say(f"{options.vehicle.name}: waiting for a flight stack on {options.over}")
     try:
         while stop.reason is None and not companion.over:

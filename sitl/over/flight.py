@@ -16,7 +16,7 @@ from sitl.flights.free_ports import free_ports
 from sitl.flights.refusals import check_feasible
 from sitl.flights.scenario import GroundControl, Scenario, scenario_vehicle, suited
 from sitl.over.processes import Account, Children
-from sitl.over.window import cut_log, step_figures
+from sitl.over.window import cut_log, shift_events, step_figures
 from sitl.report.keep import keep_recording
 from sitl.report.summary import OF_THE_PLANT, clear, positions, read_state_log, write_report
 from sitl.terminal.display import Display
@@ -173,6 +173,8 @@ def report(options: OverFlight, out: Path, account: Account) -> dict[str, Any]:
             flown = cut_log(out / PLANT_FOLDER / FILE_NAME, out / FILE_NAME, begin, until)
         except (OSError, ValueError) as error:
             failure = f"{failure}; {error}" if failure else str(error)
+    if flown and begin is not None:
+        shift_events(out / PLANT_FOLDER, out, begin)
     facts = _facts(options, account, failure)
     reference = options.scenario.reference
     path = None

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl_bridge.event_log import EventLog, read_events
+
 Array = NDArray[np.float64]
 
 
@@ -32,6 +34,16 @@ def cut_log(source: Path, target: Path, begin_s: float, end_s: float) -> bool:
     kept = kept.set_column(kept.column_names.index("time_s"), "time_s", pa.array(shifted))
     pq.write_table(kept, target, compression="zstd")
     return True
+
+
+def shift_events(source: Path, target: Path, begin_s: float) -> None:
+    """Add the plant's diary to the flight's, with times from `begin_s`; what came before has none."""
+    diary = EventLog(target)
+    for event in read_events(source):
+        late = event.time_s is not None and event.time_s >= begin_s
+        diary.add(
+            event._replace(time_s=event.time_s - begin_s if late and event.time_s is not None else None)
+        )
 
 
 REST_FROM = 8.0

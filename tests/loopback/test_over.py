@@ -13,6 +13,7 @@ import pytest
 
 from sitl.flights.free_ports import free_ports
 from sitl.report.summary import positions, read_state_log
+from sitl_bridge.event_log import read_events
 from tests.loopback.conftest import Process
 from tests.loopback.over_stack import IRIS, SerialLine, StandIn
 from tests.loopback.pymav import PyMav
@@ -49,6 +50,10 @@ def test_fly_over_a_stack_that_somebody_else_starts(start: Start, tmp_path: Path
     assert whole["vehicle_z_m"][-1] < 0.3  # landed
     for name in ("flight.png", "flight.html", "companion.parquet", "reference.parquet"):
         assert (out / name).exists(), name
+    diary = read_events(out)
+    assert {"plant", "controller"} == {event.source for event in diary}
+    modes = [event.text for event in diary if event.kind == "mode"]
+    assert modes.index("flying the load") < modes.index("handing back") < modes.index("landing")
     for words in ("PX4 is there", "took over", "handing back", "landed and disarmed"):
         assert words in errors
 
