@@ -16,6 +16,7 @@ from sitl.studies.paper.context import Context
 from sitl.studies.paper.flights import Pilot
 from sitl.studies.paper.record import Ledger
 from sitl.studies.paper.sections import (
+    beyond,
     circling,
     elasticity,
     hover,
@@ -43,10 +44,11 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
     ("The computer in the loop", sampling.section),
     ("The research question: what elasticity does", elasticity.section),
     ("Rigid design, elastic cable", rigid.section),
+    ("Beyond the paper", beyond.section),
 )
 
 
-FLIGHTS = (position.requests, circling.requests, elasticity.requests)
+FLIGHTS = (position.requests, circling.requests, elasticity.requests, beyond.requests)
 """What flies besides the hover, in the order in which it is needed."""
 
 
