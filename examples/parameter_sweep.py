@@ -38,7 +38,7 @@ async def main(connection: str) -> None:
             await asyncio.sleep(0.2)
         home, here = await telemetry.home(), await telemetry.position()
         for leg, weight in enumerate((0.1, 0.5, 2.0, 10.0)):
-            new = asyncio.create_task(heard(telemetry, "New weights fly"))
+            new = asyncio.create_task(heard(telemetry, "New weights in use"))
             await asyncio.sleep(0.1)  # the subscription is there
             await param.set_param_float("LQR_Q_INT", weight)
             await new  # the gains have been designed again, in flight

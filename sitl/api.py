@@ -168,7 +168,7 @@ def fly(
 
 def _checked_agility(agility: float | None) -> float | None:
     if agility is not None and not 0.0 <= agility <= 1.0:
-        raise DescriptionError("agility", [f"{agility!r}; expected 0 (gentle) to 1 (all there is)"])
+        raise DescriptionError("agility", [f"{agility!r}; expected 0 (gentle) to 1 (as fast as it can)"])
     return agility
 
 

@@ -198,7 +198,7 @@ class Inbox:
         degrees = (message.lat / DEG_E7_PER_DEG, message.lon / DEG_E7_PER_DEG)
         # est_capabilities: bit 0 is the position, bit 1 the velocity; some clients leave both out.
         if not all(math.isfinite(n) and abs(n) < 1e6 for n in numbers) or abs(degrees[0]) > 90.0:
-            self._out.say_seldom(peer, "Target denied: its position or velocity is no number", now)
+            self._out.say_seldom(peer, "Target denied: its position or velocity is not a number", now)
             return
         position = self._profile.origin.local(Geodetic(*degrees, message.alt))
         steering.hear_target(self._machine, position, enu_to_ned(tuple(message.vel)))

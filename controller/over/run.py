@@ -212,7 +212,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
         if log is not None:
             log.close()
     if stop:
-        speaker.say(f"stopped by {stop.reason}: nothing is sent any more, and the stack's own failsafe holds")
+        speaker.say(f"stopped by {stop.reason}: nothing more is sent; the stack's own failsafe holds")
     outcome = {
         "completed": flight.state is State.DONE,
         "failure": flight.failure,

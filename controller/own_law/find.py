@@ -53,7 +53,7 @@ def make(law: ChosenLaw, vehicle: Vehicle, rate_hz: float) -> OwnLaw:
         raise DescriptionError(where, [f"the constructor raised {cause(error, law.make)}"]) from error
     step = getattr(made, "step", None)
     if not callable(step):
-        raise DescriptionError(where, ["there is no method step(estimate, reference)"])
+        raise DescriptionError(where, ["it has no method step(estimate, reference)"])
     _check_takes(where, step, "step", positional=("estimate", "reference"))
     return made
 

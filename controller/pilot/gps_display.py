@@ -36,7 +36,7 @@ class Receiver:
         time_usec = int(gps["time_usec"])
         if time_usec != self._latest_usec:
             self._latest_usec, self._heard = time_usec, time
-        if not 0.0 <= time - self._heard <= self._silence:  # less than 0: the plant has started again
+        if not 0.0 <= time - self._heard <= self._silence:  # less than 0: the plant has restarted
             return Gps(fix_type=_NO_FIX if self._latest_usec else 0, position=self._place)
         if gps["fix_type"] < _FIX_2D:
             return Gps(int(gps["fix_type"]), int(gps["satellites_visible"]), position=self._place)

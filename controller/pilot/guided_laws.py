@@ -255,7 +255,7 @@ class GuidedLaws:
             return
         self._designing = False
         if isinstance(result, str):
-            self._station.announce(Notice(WARNING, f"Weights not used: {result}"), moment.now)
+            self._station.announce(Notice(WARNING, f"Weights rejected: {result}"), moment.now)
             return
         before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
         self._designed_length = self._wanted_length
@@ -267,7 +267,7 @@ class GuidedLaws:
             self._bind(self._body)
         if self._new_weights:
             self._new_weights = False
-            self._station.announce(Notice(INFO, "New weights fly"), moment.now)
+            self._station.announce(Notice(INFO, "New weights in use"), moment.now)
 
     def designs_due(self) -> float:
         """While they are made; parameters come in datagrams, at which the station looks at once."""

@@ -62,7 +62,7 @@ def _what_to_fly(arguments: argparse.Namespace, of_plant: bool = False) -> tuple
     overrides, agility = _overrides(arguments), None if of_plant else arguments.agility
     if arguments.scenario is None:
         if agility is not None:
-            raise DescriptionError("--agility", ["is that of a scenario's reference; expected --scenario"])
+            raise DescriptionError("--agility", ["belongs to a scenario's reference; expected --scenario"])
         return load_vehicle(arguments.vehicle or "paper", overrides), None
     from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle, with_agility
 
@@ -276,7 +276,7 @@ def _fly(arguments: argparse.Namespace) -> int:
             raise DescriptionError("--in-process", ["ground control takes processes of its own"])
         check_design(arguments.design)
         if arguments.json:
-            raise DescriptionError("--json", ["under ground control there is no summary to print"])
+            raise DescriptionError("--json", ["under ground control a flight has no summary to print"])
         options = replace(options, ground=ground_arguments(_ground_options(arguments)))
         stations = STATION_LOCAL + arguments.instance if arguments.gcs is None else arguments.gcs.local
         more = [Address("udpout", "127.0.0.1", stations)]

@@ -94,7 +94,7 @@ def _new(arguments: argparse.Namespace) -> int:
 
     file: Path | None = arguments.out or arguments.file
     if file is not None and file.exists() and not arguments.force:
-        raise DescriptionError(str(file), ["is there already; expected another file, or --force"])
+        raise DescriptionError(str(file), ["exists already; expected another file, or --force"])
     given = dict(
         parsed(key, text)
         for key in Sketch.model_fields

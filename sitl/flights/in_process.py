@@ -214,7 +214,9 @@ def _loop(
             report()
             waited = 0 if simulation.started else waited + PROGRESS_EVERY
             if waited > MOST_FREEWHEELING:
-                raise RuntimeError("the controller never armed: what it flies on is not good enough to start")
+                raise RuntimeError(
+                    "the controller never armed: its feedback never became good enough to start"
+                )
 
 
 class _Collector(Speaker):

@@ -74,11 +74,9 @@ class Sketch(Section):
             if (value := getattr(self, name)) is not None
         ]
         if len(given) > 1:
-            raise ValueError(
-                f"{' and '.join(given)}: each says how much thrust there is; expected one of them"
-            )
+            raise ValueError(f"{' and '.join(given)}: each gives the thrust; expected one of them")
         if self.stretch is not None and self.stretch_share is not None:
-            raise ValueError("stretch and stretch_share say the same; expected one of them")
+            raise ValueError("stretch and stretch_share give the same value; expected one of them")
         return self
 
     @model_validator(mode="after")

@@ -65,7 +65,7 @@ def store(module: str, key: str, kind: str, code: bytes, places: Sequence[Path])
 
     Raises OSError where no place does.
     """
-    refusal = OSError(f"no place for the machine code of {module}")
+    refusal = OSError(f"no directory to keep the machine code of {module}")
     for directory in places:
         file = directory / _file_name(module, key, kind)
         temporary = directory / f".{file.name}.{os.getpid()}"

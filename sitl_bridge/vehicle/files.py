@@ -132,7 +132,7 @@ def _on_preset(sensors: dict[str, Any], source: str) -> dict[str, Any]:
     while "preset" in below:
         name = beside(str(below["preset"]), source)
         if name in names:
-            raise DescriptionError(name, [f"preset: stands on itself ({' on '.join([*names, name])})"])
+            raise DescriptionError(name, [f"preset: is based on itself ({' on '.join([*names, name])})"])
         names.append(name)
         source, below = read_toml(name, resources.files("sitl_bridge") / "presets", "preset")
         complete = _merged(below, complete)

@@ -64,7 +64,7 @@ def test_a_device_that_goes_is_said() -> None:
     made = Line()
     os.close(made.end)
     assert made.receive() is None
-    assert "has gone" in made.said[0]
+    assert "disconnected" in made.said[0]
     made.link.send(BEAT)  # lost, without an error
     made.link.close()
 

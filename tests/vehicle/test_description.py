@@ -239,5 +239,5 @@ def test_a_preset_that_stands_on_itself_is_refused(tmp_path: Path) -> None:
     one.write_text(f'preset = "{two}"\n')
     two.write_text(f'preset = "{one}"\n')
     (line,) = faults(f"sensors.preset={one}")
-    assert "stands on itself" in line
+    assert "is based on itself" in line
     assert str(two) in line

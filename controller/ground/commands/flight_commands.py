@@ -68,7 +68,7 @@ def reposition(c: Command, machine: Machine, requests: Requests, now: float) -> 
     if math.isnan(c.p5) != math.isnan(c.p6):
         return deny("Reposition denied: latitude without longitude; send both or neither")
     if abs(c.p5) > 90 or abs(c.p6) > 180:
-        return deny(f"Reposition denied: {c.p5:g}, {c.p6:g} is no place; use degrees")
+        return deny(f"Reposition denied: {c.p5:g}, {c.p6:g} is not a valid position; use degrees")
     home = machine.profile.origin.home
     east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, home.altitude))
     yaw = math.nan if math.isnan(c.p4) else yaw_from_heading(c.p4) if math.isfinite(c.p4) else c.p4
@@ -119,7 +119,7 @@ def _centre(c: Command, machine: Machine, name: str) -> Triple | Verdict:
     if math.isnan(c.p5) != math.isnan(c.p6):
         return deny(f"{name} denied: latitude without longitude; send both or neither")
     if abs(c.p5) > 90 or abs(c.p6) > 180 or math.isinf(c.p7):
-        return deny(f"{name} denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is no place; use degrees")
+        return deny(f"{name} denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is not a valid position; use degrees")
     if machine.view is None:
         return not_now(f"{name} denied: no position yet; start the plant")
     home = machine.profile.origin.home
@@ -192,7 +192,9 @@ def set_home(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
     if c.p1 == 1.0:
         return machine.set_home_to(machine.view.position)
     if not (abs(c.p5) <= 90 and abs(c.p6) <= 180) or math.isinf(c.p7):
-        return deny(f"Home denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is no place; use degrees, or param1 = 1")
+        return deny(
+            f"Home denied: {c.p5:g}, {c.p6:g}, {c.p7:g} is not a valid position; use degrees, or param1 = 1"
+        )
     east, north, _ = machine.profile.origin.local(Geodetic(c.p5, c.p6, machine.profile.origin.home.altitude))
     return machine.set_home_to((east, north, _height(c, machine)))
 

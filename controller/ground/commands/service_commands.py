@@ -23,14 +23,14 @@ def prearm(c: Command, machine: Machine, requests: Requests, now: float) -> Verd
 def interval(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """SET_MESSAGE_INTERVAL."""
     if not math.isfinite(c.p1):
-        return deny("Message interval denied: param1 has to be a message's number")
+        return deny("Message interval denied: param1 must be a message ID")
     return requests.set_interval(c.p1, c.p2)
 
 
 def get_interval(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """GET_MESSAGE_INTERVAL."""
     if not (0 <= c.p1 <= 0xFFFF and c.p1 == int(c.p1)):
-        return deny("Message interval denied: param1 has to be a message's number")
+        return deny("Message interval denied: param1 must be a message ID")
     requests.send_interval(c.p1)
     return OK
 
@@ -40,10 +40,10 @@ def message(number: int | None = None) -> Handler:
 
     def handler(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
         if number is None and not (math.isfinite(c.p1) and c.p1 == int(c.p1)):
-            return deny("Message request denied: param1 has to be a message's number")
+            return deny("Message request denied: param1 must be a message ID")
         message_id = int(c.p1) if number is None else number
         if not requests.send_message(message_id, c.p2):
-            return deny(f"Message {message_id} does not exist here, or there is nothing to say in it yet")
+            return deny(f"Message {message_id} is not supported, or has no data yet")
         return OK
 
     return handler

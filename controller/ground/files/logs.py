@@ -103,7 +103,7 @@ class LogProtocol:
             self._data(message, peer, now, reply)
         elif number == mavlink.MAVLINK_MSG_ID_LOG_ERASE:
             self._erased |= {log.name for log in self._store.list()}
-            say("Logs are not listed any more; their files are kept")
+            say("Logs removed from the list; their files are kept")
         else:
             self._downloads.pop(peer, None)
 

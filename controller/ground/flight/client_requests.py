@@ -69,7 +69,7 @@ def takeoff(machine: Machine, altitude: float) -> Verdict:
     if fence is None or machine.view is None:
         return not_now("Take-off denied: no position yet; start the plant")
     if math.isinf(altitude):
-        return deny("Take-off denied: the altitude is no number")
+        return deny("Take-off denied: the altitude is infinite")
     if not math.isnan(altitude) and altitude <= fence.home[2]:
         below = fence.home[2] - altitude
         machine.say(
@@ -142,7 +142,7 @@ def go_to_item(machine: Machine, item: Item, only_height: bool) -> Fault | None:
     if fault is not None:
         return Fault(fault.result, f"Reposition denied: {fault.text}")
     if item.command != WAYPOINT:
-        return Fault(2, f"Reposition denied: command {item.command} is no way-point")  # UNSUPPORTED
+        return Fault(2, f"Reposition denied: command {item.command} is not a way-point")  # UNSUPPORTED
     x, y, z = plan.place(item, machine.profile.origin, machine.home_geodetic())
     point = (math.nan, math.nan, z) if only_height else (x, y, z)
     verdict = reposition(machine, Reposition(False, point, math.nan, math.nan), True)

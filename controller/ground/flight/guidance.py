@@ -379,7 +379,7 @@ class Guidance:
             self._land(view, self.hover.point)
             return
         if then is Then.LOST:
-            self._pilot.say(WARNING, "Mission stopped: its jumps go in circles; holding")
+            self._pilot.say(WARNING, "Mission stopped: its jumps form an endless loop; holding")
             self._mission.pause()
         elif then is Then.PAUSE:
             self._pilot.say(INFO, "Mission waits (autocontinue 0); start it again to go on")

@@ -103,7 +103,7 @@ def check(items: tuple[Item, ...], profile: Profile, home: Geodetic, fence: Fenc
             return Fault(fault.result, f"Mission item {index}: {fault.text}")
     looping = _endless_jump(items)
     if looping is not None:
-        text = f"Mission item {looping}: the jump goes in circles without anything to fly"
+        text = f"Mission item {looping}: the jumps form an endless loop without anything to fly"
         return Fault(mavlink.MAV_MISSION_INVALID_PARAM1, text)
     return None
 

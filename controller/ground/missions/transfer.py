@@ -135,7 +135,7 @@ class Missions:
         item = _item_of(message)
         if item is None:
             del self._uploads[client]
-            say(f"{self._name} item {message.seq}: position is no number")
+            say(f"{self._name} item {message.seq}: position is not a number")
             self._ack(client, mavlink.MAV_MISSION_INVALID_PARAM5_X, self._kind, reply)
             return
         upload.items.append(item)
@@ -150,7 +150,7 @@ class Missions:
         """An item that is no part of a plan: where to go now."""
         item = _item_of(message)
         fault = (
-            Fault(mavlink.MAV_MISSION_INVALID_PARAM5_X, "Reposition denied: position is no number")
+            Fault(mavlink.MAV_MISSION_INVALID_PARAM5_X, "Reposition denied: position is not a number")
             if item is None
             else self._go_to(item, message.current == _CHANGE_HEIGHT)
         )
@@ -197,7 +197,7 @@ class Missions:
         return fault
 
     def _partial(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
-        say("Parts of a mission cannot be written; upload all of it")
+        say("Partial mission writes are not supported; upload the whole mission")
         self._ack(client, mavlink.MAV_MISSION_UNSUPPORTED, message.mission_type, reply)
 
     def _ask(self, client: Client, reply: Reply) -> None:

@@ -103,7 +103,7 @@ class Streams:
         elif microseconds == -1:
             if number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 return deny(
-                    "HEARTBEAT cannot be turned off: a ground station would take the vehicle for lost"
+                    "HEARTBEAT cannot be turned off: a ground station would report the vehicle as lost"
                 )
             self._set(number, None, now)
         elif microseconds < 0 or not math.isfinite(microseconds):

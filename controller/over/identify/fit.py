@@ -74,7 +74,7 @@ def fit_response(
         raise ValueError(f"{len(sent.times)} samples, expected {least_samples} at least")
     inputs = response_at(*sent, frequencies_hz)
     if not np.all(np.isfinite(inputs)) or np.min(np.abs(inputs)) <= 0.0:
-        raise ValueError("the set-points carry no sines")
+        raise ValueError("the set-points contain no sine waves")
     measured = response_at(*came, frequencies_hz) / inputs
     hold, size = float(np.median(np.diff(sent.times))), float(np.mean(np.abs(measured)))
 

@@ -34,7 +34,7 @@ STILL_TIME = 0.5
 """s"""
 LONGEST_STEADYING = 8.0
 """s, after which the reference begins in any case."""
-NO_MORE = "nothing is sent any more, and the stack's own failsafe holds"
+NO_MORE = "nothing more is sent; the stack's own failsafe holds"
 OTHER_MODE = "the operator, or a failsafe, took another mode: nothing is sent any more"
 
 

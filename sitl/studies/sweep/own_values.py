@@ -25,7 +25,7 @@ def _numbers(node: Any, path: list[str], key: str, name: str) -> list[tuple[str,
     if not path:
         if isinstance(node, (int, float)) and not isinstance(node, bool):
             return [(name, float(node))]
-        raise DescriptionError(key, [f"of_own: {name} is no number; expected one that the vehicle has"])
+        raise DescriptionError(key, [f"of_own: {name} is not a number; expected one that the vehicle has"])
     step, rest = path[0], path[1:]
     entries = (
         {str(index): entry for index, entry in enumerate(node)} if isinstance(node, (list, tuple)) else node

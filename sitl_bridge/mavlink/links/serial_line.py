@@ -100,7 +100,7 @@ class SerialLink:
 
     def _lose(self) -> None:
         self.close()
-        self._say(f"{self._device} has gone: waiting for it")
+        self._say(f"{self._device} is disconnected: waiting for it")
 
     def _reopen(self, until: float) -> None:
         wait = min(self._next_attempt, until) - time.monotonic()

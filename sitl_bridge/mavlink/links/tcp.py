@@ -170,7 +170,7 @@ class TcpLink:
             self._cut(self._splitter.receive(data))
             if self._splitter.junk and not self._junk_said:
                 self._junk_said = True
-                self._say(f"bytes on {self._address} that are no MAVLink `common` frames: ignored")
+                self._say(f"bytes on {self._address} that are not MAVLink `common` frames: ignored")
         else:
             self._lose()
 

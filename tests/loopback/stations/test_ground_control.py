@@ -127,17 +127,17 @@ def test_new_weights_are_taken_in_flight_and_kept(tmp_path: Path) -> None:
     with flying_vehicle(tmp_path, (*LOCKSTEP, "--feedback", "truth")) as vehicle:  # stillness is the law's
         client = PyMav(vehicle.mavproxy, system=244)
         asyncio.run(to_height(vehicle.mavsdk))
-        client.wait_for_text("New weights fly")
+        client.wait_for_text("New weights in use")
         client.let_pass(2.0)
         client.texts().clear()
         keep, load_back = 1.0, 0.0
         assert client.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, keep) == 0
         assert json.loads(vehicle.log.with_name("parameters.json").read_text())["LQR_Q_LPOS"] == 4.0
         client.set_parameter("LQR_Q_LPOS", 1.0)
-        client.wait_for_text("New weights fly")
+        client.wait_for_text("New weights in use")
         client.texts().clear()
         assert client.command(mavlink.MAV_CMD_PREFLIGHT_STORAGE, load_back) == 0
-        client.wait_for_text("New weights fly")
+        client.wait_for_text("New weights in use")
         client.let_pass(2.0)
         client.close()
     flown = swing.read(vehicle.state_log)

@@ -108,7 +108,7 @@ def test_a_file_is_not_overwritten_unless_told(tmp_path: Path, capsys: pytest.Ca
     before = file.read_bytes()
     capsys.readouterr()
     (line,) = lines_of(capsys, "new", str(file), "--mass", "3", code=2)
-    assert line == f"{file}: is there already; expected another file, or --force"
+    assert line == f"{file}: exists already; expected another file, or --force"
     assert file.read_bytes() == before
     assert main(["vehicle", "new", "--out", str(file), "--mass", "3", "--force"]) == 0
     assert load_vehicle(str(file)).airframe.mass == 3

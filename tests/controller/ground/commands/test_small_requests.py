@@ -40,7 +40,7 @@ def test_home_is_set_here_or_there_and_return_goes_there() -> None:
 def test_a_home_that_is_no_place_is_denied(place: tuple[float, ...]) -> None:
     _rig, client = flying()
     assert client.command(179, 0, 0, 0, 0, *place).result == DENIED
-    assert "no place" in client.texts()[-1]
+    assert "valid position" in client.texts()[-1]
 
 
 def test_a_reboot_begins_afresh_and_keeps_parameters() -> None:

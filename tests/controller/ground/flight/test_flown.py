@@ -153,7 +153,7 @@ def test_weights_change_without_a_jolt_while_the_wind_pushes() -> None:
     for name, factor in (("LQR_Q_INT", 10.0), ("LQR_R_MOMENT", 5.0), ("LQR_Q_ATT", 0.2)):
         set_parameter(client, name, factor)
         flight.run(3.0)
-        assert "New weights fly" in client.texts()[-1]
+        assert "New weights in use" in client.texts()[-1]
         assert np.ptp(flight.flown(3.0).load, axis=0).max() < 0.02, name
 
 

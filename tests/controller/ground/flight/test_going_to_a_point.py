@@ -38,7 +38,7 @@ def test_going_to_a_point_and_pausing() -> None:
 @pytest.mark.parametrize(
     ("params", "words"),
     [
-        ((-1, 1, 0, NAN, 91.0, 8.0, 492.0), "no place"),
+        ((-1, 1, 0, NAN, 91.0, 8.0, 492.0), "valid position"),
         ((-1, 1, 0, NAN, ZURICH[0], NAN, 492.0), "both or neither"),
         ((-1, 1, 0, NAN, ZURICH[0] + 1, ZURICH[1], 492.0), "GF_MAX_HOR_DIST"),
         ((-1, 1, 0, NAN, ZURICH[0], ZURICH[1], 800.0), "GF_MAX_VER_DIST"),

@@ -291,7 +291,7 @@ def test_an_old_item_whose_degrees_fit_no_integer_ends_the_upload(x: float, y: f
     rig = Rig()
     rig.count(1)
     assert rig.old_item(0, x, y) == [ack(mavlink.MAV_MISSION_INVALID_PARAM5_X)]
-    assert rig.said == ["Mission item 0: position is no number"]
+    assert rig.said == ["Mission item 0: position is not a number"]
     assert rig.item(0) == []
     rig.count(1)
     assert rig.old_item(0, 213.9, -213.9) == [ack(ACCEPTED)]  # `check` judges it
@@ -319,7 +319,7 @@ def test_an_item_of_guided_flight_is_flown_to_at_once_and_is_no_part_of_an_uploa
 def test_a_guided_item_without_a_place_is_refused() -> None:
     rig = Rig()
     assert rig.old_item(0, math.nan, 0.0, current=2) == [ack(mavlink.MAV_MISSION_INVALID_PARAM5_X)]
-    assert rig.said == ["Reposition denied: position is no number"]
+    assert rig.said == ["Reposition denied: position is not a number"]
     assert rig.went_to == []
 
 
@@ -359,7 +359,7 @@ def test_parts_of_a_plan_cannot_be_written() -> None:
     rig = Rig()
     part = mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, MISSION)
     assert rig.send(part) == [ack(mavlink.MAV_MISSION_UNSUPPORTED)]
-    assert rig.said == ["Parts of a mission cannot be written; upload all of it"]
+    assert rig.said == ["Partial mission writes are not supported; upload the whole mission"]
 
 
 def test_other_messages_are_none_of_its_business() -> None:

@@ -43,7 +43,7 @@ def test_fixes_and_their_end() -> None:
     assert math.isnan(lost.horizontal_accuracy)
     wire["time_usec"] = 2_400_000
     assert receiver.look(2.5).fix_type == 3
-    assert receiver.look(0.1).fix_type == 1  # the plant has started again
+    assert receiver.look(0.1).fix_type == 1  # the plant has restarted
     wire["time_usec"], wire["fix_type"], wire["satellites_visible"] = 2_500_000, 1, 3
     lost = receiver.look(2.6)
     assert (lost.fix_type, lost.satellites, lost.position) == (1, 3, seen.position)

@@ -95,7 +95,7 @@ def test_an_orbit_during_take_off_waits_for_its_end() -> None:
         ((0.0, 2.0, 0.0, 0.0), (*CENTRE, 494.0), "see DO_ORBIT"),
         ((5.0, math.inf, 0.0, 0.0), (*CENTRE, 494.0), "infinite"),
         ((5.0, 2.0, 0.0, 0.0), (CENTRE[0], UNSET, 494.0), "both or neither"),
-        ((5.0, 2.0, 0.0, 0.0), (950_000_000, CENTRE[1], 494.0), "no place"),
+        ((5.0, 2.0, 0.0, 0.0), (950_000_000, CENTRE[1], 494.0), "valid position"),
         ((900.0, 2.0, 0.0, 0.0), (*CENTRE, 494.0), "geofence"),
     ],
 )
