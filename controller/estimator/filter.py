@@ -139,6 +139,7 @@ class Estimator:
         self._record[...] = np.zeros((), dtype=INPUT)
         self._output[...] = 0.0
         self.memory["in_flight"] = in_flight
+        self.memory["delay_found"] = -1
         if in_flight:
             speeds = hover_rotor_speeds(self.vehicle)
             self.memory["rotor_speed"][: len(speeds)] = speeds
@@ -222,6 +223,17 @@ class Estimator:
         Nominal state and covariance stay.
         """
         self.memory["slip"][:3] = offset
+
+    @property
+    def found_delay(self) -> int:
+        """Ticks after which commands are seen to act, when it is not what is reckoned with; else -1."""
+        return int(self.memory["delay_found"])
+
+    def set_delay(self, ticks: int) -> None:
+        """Commands act so many ticks late from now on."""
+        self._filter[0]["p"]["command_delay"] = ticks
+        self.memory["delay_found"] = -1
+        self.memory["delay_ticks_compared"] = 0
 
     def reeled(self, rest_length: float, rate: float) -> None:
         """The winch has made the cable so long (m), and goes on at a rate (m/s, positive pays out)."""

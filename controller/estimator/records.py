@@ -80,6 +80,12 @@ CLONE_FREE, CLONE_MOTION, CLONE_LOAD, CLONE_WANDER = 0, 1, 2, 3
 receiver wanders, the present error of its position, which fades and is not the vehicle's."""
 
 MOST_ROTORS = 16
+DELAY_STEP = 2
+"""Ticks between two delays of the loop that are compared."""
+DELAYS = 21
+"""So many delays from 0 on are, and that which the filter reckons with."""
+DELAY_HISTORY = 64
+"""Ticks of commanded and measured turning that are kept for it."""
 COMMAND_HISTORY = 65  # as many as loop.delay_ticks may ask for, and one
 # The estimate, in the order of eq. 31 (see controller.law.state): first index of each part.
 POSITION_OUT, LOAD_OUT, VELOCITY_OUT, LOAD_VELOCITY_OUT, BODY_RATES_OUT, EULER_OUT = 0, 3, 6, 9, 12, 15
@@ -165,6 +171,13 @@ MEMORY = np.dtype(
         ("thrust", "f8"),
         ("commands", "f8", (COMMAND_HISTORY, MOST_ROTORS)),
         ("command_count", "i8"),
+        ("turned", "f8", (DELAY_HISTORY, 2)),
+        ("rates", "f8", (DELAY_HISTORY, 2)),
+        ("prompt_speed", "f8", MOST_ROTORS),
+        ("delay_misfit", "f8", DELAYS + 1),
+        ("delay_ticks_watched", "i8"),
+        ("delay_ticks_compared", "i8"),
+        ("delay_found", "i8"),
         ("tension", "f8"),
         ("slack_time", "f8"),
         ("swing_due", "f8"),
@@ -209,6 +222,9 @@ MEMORY = np.dtype(
 )
 """What the filter remembers besides state and covariance.
 
+turned, rates: about x and y, rad/s: what the rotors' moments would have added up to without any delay, and
+the gyroscope; prompt_speed: rad/s, of rotors without it; other delay_*: see `late_commands`; delay_found: in
+ticks, -1: none;
 hook_closed: the gripper is to grab, so that a pull is that of a dropped load; grounded: a vehicle that stands
 does so on the ground, and is not held; contact_time, lying_time: s for which something below has carried the
 vehicle or the load;

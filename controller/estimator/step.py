@@ -21,6 +21,7 @@ from controller.estimator.correct.sensors import (
     rest,
 )
 from controller.estimator.dropped_load import drop
+from controller.estimator.late_commands import watch_delay
 from controller.estimator.predict.process import predict
 from controller.estimator.records import (
     ALIGNING,
@@ -129,6 +130,7 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
     m.adrift = m.vehicle_mode == FLYING and silence > OUTAGE
     if given.has_imu:
         gyroscope(f, given.gyroscope)
+        watch_delay(f, given.gyroscope, ticks)
         accelerometer(f, given.accelerometer)
         watch(f, given.accelerometer)
     if given.has_magnetometer:

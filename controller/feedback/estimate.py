@@ -104,6 +104,7 @@ class EstimateFeedback:
         self._log = log
         self._origin = LocalOrigin(vehicle.home.latitude, vehicle.home.longitude, vehicle.home.altitude)
         self._largest_speeds = np.array([rotor.max_speed for rotor in vehicle.rotors])
+        self.loop_delay: int | None = None
         self._standing = np.zeros(len(vehicle.rotors))
         self._hover_speeds = np.array(hover_rotor_speeds(vehicle))
         self._watch = HealthWatch(vehicle.sensors.tracker is not None)
@@ -116,6 +117,7 @@ class EstimateFeedback:
     def _align(self, in_flight: bool) -> None:
         self.estimator.reset(in_flight=in_flight)
         self._flown = self._lost = False
+        self.loop_delay = None
         self._released = False  # nothing holds the vehicle at its start any more
         self._first_usec: int | None = None
         self._tick = self._first_flown = self._falling = 0
@@ -149,6 +151,9 @@ class EstimateFeedback:
                 self._see_load(decode(frame))
         if not self._flown and estimator.held and self._vehicle.initial.start == "hover":
             self._begin_at_described_start()
+        if estimator.found_delay >= 0:
+            self.loop_delay = max(estimator.found_delay, self._vehicle.loop.delay_ticks)
+            estimator.set_delay(self.loop_delay)
         estimate = estimator.tick(self._tick / self._rate_hz)
         if self.guessing or (estimator.in_flight and not self._flown and not self.ready()):
             return None
@@ -183,6 +188,8 @@ class EstimateFeedback:
                 return 0
             if not self._released:
                 self._released = not self.estimator.held
+                return 0
+            if self.estimator.found_delay >= 0:
                 return 0
             size: int = answer(length, last_time_usec, sequence, until_s, self._first_usec, self._rate_hz)
             if size:

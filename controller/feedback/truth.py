@@ -33,6 +33,8 @@ class Feedback(Protocol):
     name: str
     needs_truth: bool
     """Whether the plant is to be asked for ODOMETRY."""
+    loop_delay: int | None
+    """Ticks after which commands act, where they were found to act later than told; else None."""
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick; None while there is none to fly on."""
@@ -55,6 +57,7 @@ class TruthFeedback:
 
     name = "truth"
     needs_truth = True
+    loop_delay: int | None = None
 
     def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The state that the plant says it is in."""

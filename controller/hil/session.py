@@ -72,6 +72,9 @@ class Pilot(Protocol):
     def disarm(self) -> None:
         """Stop the rotors; the next step starts afresh."""
 
+    def act_late(self, ticks: int) -> None:
+        """Commands have been found to act so many ticks late, which is more than was told."""
+
 
 class HilSession:
     """Answers the ticks of one plant; `receive(datagram, now)`, `to_send(now)`, `next_deadline()`."""
@@ -98,6 +101,7 @@ class HilSession:
         self._feedback = feedback
         self._tick_rate = tick_rate
         self._terms_log = terms_log
+        self._loop_delay: int | None = None
         self._law: Law | None = None
         self._plain_tick: PlainTick | None = None  # of that law
         self._instance = instance
@@ -184,6 +188,7 @@ class HilSession:
     def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
         at_our_rate = self._tick_rate is None or self._tick_rate.fits(time_usec)
         estimate = self._feedback.take(time_usec, tick, self._reader)
+        self._follow_delay()
         if estimate is not None and at_our_rate:
             before = self._autopilot.armed
             self._autopilot.step(estimate, time_usec, now)
@@ -214,6 +219,15 @@ class HilSession:
             self._plain_tick = (
                 None if law is None else self._feedback.plain_tick(self._reader, law, self._writer)
             )
+
+    def _follow_delay(self) -> None:
+        late = self._feedback.loop_delay
+        if late == self._loop_delay:
+            return
+        self._loop_delay = late
+        if late is not None:
+            self._say(f"commands act {late} ticks late: the gains are for that now")
+            self._autopilot.act_late(late)
 
     def _disarm(self) -> None:
         self._autopilot.disarm()

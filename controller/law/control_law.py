@@ -264,7 +264,7 @@ def remember(design: Any, memory: Any, work: Any) -> None:
         under_way = work.achieved[k] - work.feedforward[k]
         acting = memory.past[oldest, k] if design.delay > 0 else under_way
         memory.rotors[k] = design.lag_decay * memory.rotors[k] + (1.0 - design.lag_decay) * acting
-        for age in range(oldest, 0, -1):
+        for age in range(LONGEST_DELAY - 1, 0, -1):  # all of it: the delay may be found to be longer
             memory.past[age, k] = memory.past[age - 1, k]
         memory.past[0, k] = under_way
         work.terms[SATURATED, k] = work.achieved[k] - work.wrench[k]

@@ -87,6 +87,9 @@ class OwnLawPilot:
     def flown_whole(self, time_usec: int, now: float) -> None:
         """Nothing here depends on it."""
 
+    def act_late(self, ticks: int) -> None:
+        """The law is the user's own; it has been said."""
+
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.design.catalogue import design
+from controller.design.later import acting_later, follow
 from controller.design.motion.prepared import PreparedMotion
 from controller.design.names import FOR_ESTIMATES
 from controller.feedback.truth import PathFrom
@@ -42,7 +43,9 @@ class Autopilot:
         expected = path_from(vehicle.initial_load_position)
         self._motion = PreparedMotion(expected, vehicle, estimated=design_name in FOR_ESTIMATES.values())
         self._path_from = path_from
-        self._design = design(design_name, vehicle, rate_hz)
+        self._vehicle = vehicle
+        self._told = design(design_name, vehicle, rate_hz)
+        self._design = self._told.copy()
         self._allocation = allocation(vehicle)
         self._step: Callable[[], int] | None = None
 
@@ -61,6 +64,12 @@ class Autopilot:
 
     def flown_whole(self, time_usec: int, now: float) -> None:
         """Nothing here depends on it."""
+
+    def act_late(self, ticks: int) -> None:
+        """Gains that predict over the longer delay, from the next step on."""
+        self._design[:] = acting_later(self._told, self._vehicle, ticks)
+        if self.law is not None:
+            follow(self._design, self.law[3])
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant has no effect."""

@@ -103,6 +103,10 @@ class GuidedAutopilot:
         self._due = AT_ONCE
         self.station.machine.payload.restart()
 
+    def act_late(self, ticks: int) -> None:
+        """Gains that predict over the longer delay, from the next step on."""
+        self._laws.act_late(ticks)
+
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, battery and winch are measured."""
         self._due = AT_ONCE

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from controller.design.catalogue import EVEN, Emphasis, guided_designs
+from controller.design.later import follow
 from controller.feedback.assessment import Contact
 from controller.ground.commands.result import INFO, WARNING, Notice
 from controller.ground.flight.motion.setpoint_types import (
@@ -40,6 +41,7 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
+from controller.pilot.late_gains import LateGains
 from controller.pilot.stages import AT_ONCE, NEVER, Moment
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Vehicle
@@ -99,6 +101,8 @@ class GuidedLaws:
         """m, of the cable that the gains are for, or will be"""
         self._designing = self._new_weights = False
         self._designs = dict(zip((Body.LOAD, Body.VEHICLE), guided_designs(vehicle, rate_hz), strict=True))
+        self._late_gains = LateGains(vehicle)
+        self._late_gains.made(self._designs, self._designed_length)
         pole = motion_pole(vehicle.hover_length, vehicle.gravity)
         self._trajectory = Trajectory(1.0 / rate_hz, pole, with_the_law=True)
         weight = vehicle.gravity * (vehicle.airframe.mass + vehicle.load.mass)
@@ -259,6 +263,7 @@ class GuidedLaws:
             return
         before, self._designs = self._designs, dict(zip((Body.LOAD, Body.VEHICLE), result, strict=True))
         self._designed_length = self._wanted_length
+        self._late_gains.made(self._designs, self._designed_length)
         self._designs[Body.LOAD]["body"]["rest_length"] = self._station.profile.rest_length
         if self._body is not None:
             yaw = float(self._trajectory.path["yaw"][0])
@@ -268,6 +273,12 @@ class GuidedLaws:
         if self._new_weights:
             self._new_weights = False
             self._station.announce(Notice(INFO, "New weights in use"), moment.now)
+
+    def act_late(self, ticks: int) -> None:
+        """Commands act so many ticks late: the gains, and what is remembered of the rotors, follow."""
+        self._late_gains.act_late(self._designs, ticks)
+        if self._body is not None:
+            follow(self._designs[self._body], self._memory)
 
     def designs_due(self) -> float:
         """While they are made; parameters come in datagrams, at which the station looks at once."""
