@@ -7,7 +7,7 @@ import pytest
 
 from controller.design.motion.ramp import planned
 from controller.law.allocation import allocation
-from controller.law.flatness import STENCIL, body, flat_motion
+from controller.law.flatness import STENCIL, body
 from controller.law.reference import Path, circle, feasible, setpoint
 from controller.law.state import (
     BODY_RATES,
@@ -21,6 +21,7 @@ from controller.law.state import (
 from sitl_bridge.plant.physics import dynamics
 from sitl_bridge.plant.physics.parameters import parameters
 from sitl_bridge.vehicle.description import Vehicle
+from tests.controller.compiled_motion import motion
 from tests.controller.coordinates import paper_state, plant_state
 from tests.controller.fleet import FLEET, attributes
 
@@ -37,10 +38,9 @@ def flat(vehicle: Vehicle, path: Path, t: float, lead: float = 0.0, lag: float =
     """x* (18,) at t and u* (4,) at t + lead, for rotors that lag."""
     state, wrench = np.full(STATE_SIZE, np.nan), np.full(WRENCH_SIZE, np.nan)
     record = np.array([body(vehicle)], dtype=body(vehicle).dtype)
-    scratch = attributes(np.zeros(1, dtype=STENCIL))
     yaw = float(path["yaw"][0])
     heading = np.array([np.cos(yaw), np.sin(yaw)])
-    flat_motion(attributes(record), attributes(path), t, lead, lag, heading, scratch, state, wrench)
+    motion.bind(record, path, np.zeros(1, dtype=STENCIL), heading, state, wrench)(t, lead, lag)
     return state, wrench
 
 
