@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from controller.hil.answers import AnswerWriter
 from sitl_bridge.ids import COMPONENT_AUTOPILOT
 from sitl_bridge.mavlink.framing import Frame, Packer
+from sitl_bridge.plant.clocks.lockstep import Lockstep
+from sitl_bridge.plant.clocks.realtime import Realtime
+from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.wire.answers import AnswerReader
+
+C = TypeVar("C", Lockstep, Realtime)
 
 PERIOD = 0.004
 TICK_US = 4000
@@ -38,7 +44,7 @@ class CountedSimulation:
         self.tick = 1
         self.started = False
         self.done: list[Any] = []
-        self.may_exchange = False
+        self.flies_whole = False
         self._last_tick = last_tick
 
     @property
@@ -65,10 +71,10 @@ class CountedSimulation:
         self.tick += 1
 
     def fly_whole_tick(self, datagram: bytes) -> bool:
-        if self.may_exchange:
-            self.done.append("exchanged")
+        if self.flies_whole:
+            self.done.append("flown whole")
             self.tick += 1
-        return self.may_exchange
+        return self.flies_whole
 
     def heard(self) -> None:
         self.done.append("heard")
@@ -94,6 +100,38 @@ class Answers:
         self._writer.controls[:] = 0.0
         self._writer.controls[: len(controls)] = controls
         return bytes(self._writer.answer(tick * TICK_US, armed))
+
+
+class ScriptedClock(Generic[C]):
+    """A clock that was started at 100 s, and the time that the test has come to."""
+
+    def __init__(
+        self,
+        make: Callable[[CountedSimulation, Notices, int], C],
+        simulation: CountedSimulation,
+        instance: int = 0,
+    ) -> None:
+        self.said: list[str] = []
+        self.simulation = simulation
+        self.clock = make(simulation, Notices(self.said.append), instance)
+        self.answers = Answers(instance)
+        self.now = 100.0
+        self.clock.start(self.now)
+
+    def send(self, after: float = 0.0) -> list[bytes]:
+        """What goes out so many seconds later."""
+        self.now += after
+        return self.clock.to_send(self.now)
+
+    def send_when_due(self) -> list[bytes]:
+        """What goes out at the next deadline."""
+        self.now = self.clock.next_deadline()
+        return self.send()
+
+    def answer(self, tick: int, *controls: float, armed: bool = True, after: float = 0.0) -> None:
+        """The autopilot answers, so many seconds later."""
+        self.now += after
+        self.clock.receive(self.answers.to(tick, *controls, armed=armed), self.now)
 
 
 def four(value: float) -> list[float]:

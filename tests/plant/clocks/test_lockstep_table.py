@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import pytest
@@ -16,35 +17,15 @@ from sitl_bridge.plant.clocks.lockstep import (
     Lockstep,
 )
 from sitl_bridge.plant.clocks.retransmission import FIRST_TIMEOUT
-from sitl_bridge.plant.log.notices import Notices
-from tests.plant.clocks.scripted import PERIOD, Answers, CountedSimulation, four
+from tests.plant.clocks.scripted import PERIOD, CountedSimulation, ScriptedClock, four
 
 SILENT, BACK = "no answer from the autopilot: the world waits for it", "autopilot answers again"
 
 
-class Clock:
-    """A clock that was started at 100 s."""
-
+class Clock(ScriptedClock[Lockstep]):
     def __init__(self, last_tick: int = 10**9, instance: int = 0, **options: Any) -> None:
-        self.said: list[str] = []
-        self.simulation = CountedSimulation(instance, last_tick=last_tick)
-        self.clock = Lockstep(self.simulation, Notices(self.said.append), instance, **options)  # type: ignore[arg-type]
-        self.answers = Answers(instance)
-        self.now = 100.0
-        self.clock.start(self.now)
-
-    def send(self, after: float = 0.0) -> list[bytes]:
-        """What goes out so many seconds later."""
-        self.now += after
-        return self.clock.to_send(self.now)
-
-    def send_when_due(self) -> list[bytes]:
-        self.now = self.clock.next_deadline()
-        return self.send()
-
-    def answer(self, tick: int, *controls: float, armed: bool = True, after: float = 0.0) -> None:
-        self.now += after
-        self.clock.receive(self.answers.to(tick, *controls, armed=armed), self.now)
+        simulation = CountedSimulation(instance, last_tick=last_tick)
+        super().__init__(partial(Lockstep, **options), simulation, instance)  # type: ignore[arg-type]
 
     def in_flight(self) -> Clock:
         """Begun by the answer to tick 1 within a millisecond, tick 2 sent."""
@@ -141,18 +122,18 @@ def test_duplicates_and_answers_to_other_ticks_are_dropped() -> None:
 
 def test_the_whole_tick_is_taken_where_there_is_one() -> None:
     c = Clock().in_flight()
-    c.simulation.may_exchange = True
+    c.simulation.flies_whole = True
     c.answer(2, after=0.001)
-    assert c.simulation.done == ["exchanged"]
+    assert c.simulation.done == ["flown whole"]
     assert c.send() == [b"tick 3"]
     c.send(FIRST_TIMEOUT + 1.0)  # repeated: the datagram is taken apart
     c.answer(3)
-    assert c.simulation.done == ["exchanged", ("flown", [0.0] * 4)]
+    assert c.simulation.done == ["flown whole", ("flown", [0.0] * 4)]
 
 
 def test_the_whole_tick_is_not_taken_where_the_last_controls_have_to_be_known() -> None:
     c = Clock(on_silence="continue").in_flight()
-    c.simulation.may_exchange = True
+    c.simulation.flies_whole = True
     c.answer(2, 0.5)
     assert c.simulation.done == [("flown", [0.5, 0, 0, 0])]
 

@@ -6,39 +6,23 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from sitl_bridge.plant.clocks.realtime import AUTOPILOT_TIMEOUT, Realtime
-from sitl_bridge.plant.log.notices import Notices
-from tests.plant.clocks.scripted import PERIOD, Answers, CountedSimulation, four
+from tests.plant.clocks.scripted import PERIOD, CountedSimulation, ScriptedClock, four
 
 STOPPED_TEXT = f"no answer from the autopilot for {AUTOPILOT_TIMEOUT} s: rotors stopped"
 
 
-class Clock:
-    """A clock that was started at 100 s."""
-
+class Clock(ScriptedClock[Realtime]):
     def __init__(self, last_tick: int = 10**9, delay_ticks: int = 0) -> None:
-        self.said: list[str] = []
-        self.simulation = CountedSimulation(delay_ticks=delay_ticks, last_tick=last_tick)
-        self.clock = Realtime(self.simulation, Notices(self.said.append), 0)  # type: ignore[arg-type]
-        self.answers = Answers()
-        self.now = 100.0
-        self.clock.start(self.now)
+        super().__init__(Realtime, CountedSimulation(delay_ticks=delay_ticks, last_tick=last_tick))  # type: ignore[arg-type]
 
-    def send(self, after: float = 0.0) -> list[bytes]:
-        self.now += after
-        return self.clock.to_send(self.now)
-
-    def send_when_due(self) -> list[bytes]:
-        self.now = self.clock.next_deadline()
-        return self.send()
-
-    def answer(self, tick: int, control: float = 0.5, armed: bool = True, after: float = 0.0) -> None:
-        self.now += after
-        self.clock.receive(self.answers.to(tick, *[control] * 4, armed=armed), self.now)
+    def answer_four(self, tick: int, control: float = 0.5, armed: bool = True, after: float = 0.0) -> None:
+        """The autopilot answers with the same control for four rotors."""
+        self.answer(tick, *[control] * 4, armed=armed, after=after)
 
     def in_flight(self) -> Clock:
         """Begun by the answer to tick 1 at its beginning; no command is under way."""
         self.send()
-        self.answer(1)
+        self.answer_four(1)
         assert self.send_when_due() == [b"tick 2"]
         self.simulation.done.clear()
         return self
@@ -87,10 +71,10 @@ def test_exactly_a_period_late_is_late() -> None:
 def test_the_first_armed_answer_begins_the_scenario_and_counts() -> None:
     c = Clock()
     c.send()
-    c.answer(1, armed=False)
+    c.answer_four(1, armed=False)
     assert c.simulation.done == ["heard"]
-    c.answer(1, 0.5)
-    c.answer(1, 0.75)
+    c.answer_four(1, 0.5)
+    c.answer_four(1, 0.75)
     assert c.simulation.done == ["heard", "heard", "begun", "heard"]
     c.send_when_due()
     assert c.simulation.done[4:] == [[(0, four(0.5)), (0, four(0.75))]]
@@ -98,18 +82,18 @@ def test_the_first_armed_answer_begins_the_scenario_and_counts() -> None:
 
 def test_an_unarmed_answer_in_flight_stops_the_rotors() -> None:
     c = Clock().in_flight()
-    c.answer(2, 0.5, armed=False)
+    c.answer_four(2, 0.5, armed=False)
     c.send_when_due()
     assert c.simulation.done == ["heard", [(0, [0.0] * 4)]]
 
 
 def test_a_command_acts_from_the_step_in_which_it_arrives() -> None:
     c = Clock().in_flight()
-    c.answer(2, 0.25, after=0.26 * PERIOD)
-    c.answer(2, 0.75, after=0.5 * PERIOD)
+    c.answer_four(2, 0.25, after=0.26 * PERIOD)
+    c.answer_four(2, 0.75, after=0.5 * PERIOD)
     c.send_when_due()
     assert c.simulation.done[2:] == [[(2, four(0.25)), (6, four(0.75))]]
-    c.answer(3, 0.5, after=0.99 * PERIOD)
+    c.answer_four(3, 0.5, after=0.99 * PERIOD)
     c.send_when_due()
     assert c.simulation.done[-1] == [(8, four(0.5))]
     c.send_when_due()
@@ -118,7 +102,7 @@ def test_a_command_acts_from_the_step_in_which_it_arrives() -> None:
 
 def test_commands_of_a_tick_that_ended_late_do_not_act_beyond_it() -> None:
     c = Clock().in_flight()
-    c.answer(2, 0.5, after=3 * PERIOD)
+    c.answer_four(2, 0.5, after=3 * PERIOD)
     c.send()
     assert c.simulation.done[-1] == [(8, four(0.5))]
 
@@ -127,7 +111,7 @@ def test_a_command_waits_for_the_loops_delay() -> None:
     c = Clock(delay_ticks=2).in_flight()
     for _ in range(3):  # the first answer's acts
         c.send_when_due()
-    c.answer(c.simulation.tick, 0.75, after=0.5 * PERIOD)
+    c.answer_four(c.simulation.tick, 0.75, after=0.5 * PERIOD)
     for expected in ([], [], [(4, four(0.75))]):
         c.send_when_due()
         assert c.simulation.done[-1] == expected
@@ -135,19 +119,19 @@ def test_a_command_waits_for_the_loops_delay() -> None:
 
 def test_an_answer_that_a_newer_one_has_overtaken_is_dropped() -> None:
     c = Clock().in_flight()
-    c.answer(2, 0.75)
-    c.answer(1, 0.25)
+    c.answer_four(2, 0.75)
+    c.answer_four(1, 0.25)
     c.send_when_due()
     assert c.simulation.done == ["heard", [(0, four(0.75))]]
 
 
 def test_an_answer_to_a_tick_to_come_is_ignored_and_said_once() -> None:
     c = Clock().in_flight()
-    c.answer(3)
-    c.answer(9)
+    c.answer_four(3)
+    c.answer_four(9)
     assert c.simulation.done == []
     assert c.said == ["an answer to a tick that has not happened yet: ignored"]
-    c.answer(2)  # and does not overtake anything
+    c.answer_four(2)  # and does not overtake anything
     assert c.simulation.done == ["heard"]
 
 
@@ -161,7 +145,7 @@ def test_silence_stops_the_rotors_and_is_said_once() -> None:
         c.send_when_due()
         assert c.simulation.done[-1] == [(0, [0.0] * 4)]
     assert c.said == [STOPPED_TEXT]
-    c.answer(c.simulation.tick, 0.5)
+    c.answer_four(c.simulation.tick, 0.5)
     assert c.said == [STOPPED_TEXT, "autopilot answers again"]
     c.send_when_due()
     assert c.simulation.done[-1] == [(0, four(0.5))]
@@ -176,7 +160,7 @@ def test_a_command_that_is_under_way_when_the_autopilot_falls_silent_is_lost() -
 
 def test_rotors_stop_after_the_commands_that_were_in_time() -> None:
     c = Clock().in_flight()
-    c.answer(2, 0.25, after=0.5 * PERIOD)
+    c.answer_four(2, 0.25, after=0.5 * PERIOD)
     c.send(AUTOPILOT_TIMEOUT + PERIOD)
     assert c.simulation.done[-1] == [(4, four(0.25)), (4, [0.0] * 4)]
 
