@@ -63,7 +63,7 @@ class EstimateAssessor:
             return _without_estimate(view)
         self._given_up, view.estimated = False, True
         health = self._feedback.estimator.health()
-        ready = self._feedback.ready() or self._feedback.estimator.flying
+        ready = self._feedback.estimator.flying or self._feedback.ready()
         for name, good in sensors_good(health).items():
             setattr(view.health, name, good)
         view.health.wrong = next((name for name in SENSORS if health.sensors[name].offset > 0.0), "")

@@ -28,8 +28,9 @@ from controller.hil.session import is_plant_heartbeat
 from controller.hil.ticks import TickReader, plant_seconds
 from controller.law.control_law import Law
 from controller.law.state import Array
-from controller.pilot.guided_laws import GuidedLaws, Redesigner
+from controller.pilot.guided_laws import GuidedLaws
 from controller.pilot.guided_payload import PayloadWork
+from controller.pilot.redesign import Redesigner
 from controller.pilot.sight import Sight
 from controller.pilot.stages import AT_ONCE, NEVER, Moment, Stage, due, never_due, run
 from sitl_bridge.mavlink.framing import Frame
@@ -109,12 +110,12 @@ class GuidedAutopilot:
 
     def hear(self, frame: Frame, now: float) -> None:
         """Anything else from the plant: the load speaks for itself, battery and winch are measured."""
-        self._due = AT_ONCE
         self.station.hear_plant(frame, now)
         if is_plant_heartbeat(frame):  # its time stands still: nothing is lost
             self._heard = now
         self._sight.hear(frame)
         self._payload.hear(frame)
+        self._due = due(self._stages)
 
     def wait(self, now: float) -> None:
         """No tick has come: the failsafes go on."""
@@ -126,8 +127,13 @@ class GuidedAutopilot:
 
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31."""
-        self._source, self._unseen = estimate, None
+        self._source = estimate
         self._laws.estimate[:] = estimate
+        if plant_seconds(time_usec) < self.whole_until(now):  # what came with the tick had to be taken apart
+            self._laws.go_on()
+            self.flown_whole(time_usec, now)
+            return
+        self._unseen = None
         self._heard = now
         first = self._sight.view is None
         view, contact = self._sight.look(estimate, plant_seconds(time_usec), self.armed)

@@ -7,11 +7,10 @@ that steers attitude and thrust.
 from __future__ import annotations
 
 import math
-from typing import Protocol
 
 import numpy as np
 
-from controller.design.catalogue import EVEN, Emphasis, guided_designs
+from controller.design.catalogue import EVEN, guided_designs
 from controller.design.later import follow
 from controller.feedback.assessment import Contact
 from controller.ground.commands.result import INFO, WARNING, Notice
@@ -31,7 +30,7 @@ from controller.ground.telemetry.vehicle_state import VehicleView
 from controller.law import bumpless_transfer as handover
 from controller.law.allocation import allocation
 from controller.law.attitude_law import attitude_law, attitude_step, set_limits
-from controller.law.control_law import WORK, Design, Law, Memory, engaged_memory
+from controller.law.control_law import WORK, Law, Memory, engaged_memory
 from controller.law.control_step import control_step
 from controller.law.state import (
     EULER_ANGLES,
@@ -42,6 +41,7 @@ from controller.law.state import (
     Array,
 )
 from controller.pilot.late_gains import LateGains
+from controller.pilot.redesign import WEIGHTS, Redesigner
 from controller.pilot.stages import AT_ONCE, NEVER, Moment
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Vehicle
@@ -59,29 +59,6 @@ THRUST_SHARE = 0.85
 """Of all rotors' thrust, that motions are planned with; the rest is for the feedback."""
 LEAST_ACCELERATION = 0.5
 """m/s², planned with in any case"""
-
-WEIGHTS = {
-    "LQR_Q_VPOS": "vehicle_position",
-    "LQR_Q_LPOS": "load_position",
-    "LQR_Q_VVEL": "vehicle_velocity",
-    "LQR_Q_LVEL": "load_velocity",
-    "LQR_Q_RATE": "body_rates",
-    "LQR_Q_ATT": "attitude",
-    "LQR_Q_INT": "integral",
-    "LQR_R_THRUST": "thrust",
-    "LQR_R_MOMENT": "moments",
-}
-"""Parameters that weigh the designs, and what of `Emphasis` they are."""
-
-
-class Redesigner(Protocol):
-    """Makes designs in the background."""
-
-    def request(self, emphasis: Emphasis, rest_length: float) -> None:
-        """Begin to design, for a cable of this length (m); what was under way is given up."""
-
-    def result(self) -> tuple[Design, Design] | str | None:
-        """The designs of the last request, once, when they are there; or why there are none."""
 
 
 class GuidedLaws:
@@ -157,6 +134,10 @@ class GuidedLaws:
         if body is not target.body:
             target = self._pull(target, moment.view)
         self._trajectory.aim(target, self._limits())
+        self._step()
+
+    def go_on(self) -> None:
+        """One step more towards the same target, with the law that flies."""
         self._step()
 
     def fly_due(self) -> float:

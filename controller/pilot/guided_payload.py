@@ -72,6 +72,9 @@ class PayloadWork:
         winch = self._winch
         if winch is None:
             return
+        if self.reel_due() == NEVER:
+            self._assessor.reeled(winch.length, winch.speed)  # a filter that has begun anew does not know
+            return
         change = winch.length - self._station.profile.rest_length
         if change != 0.0:
             self._station.machine.reeled(change)
