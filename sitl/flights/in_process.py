@@ -27,8 +27,7 @@ from sitl_bridge.mavlink.tlog import RECORDED_HZ, TlogWriter
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices
-from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH, columns, fill_row, kept_columns
-from sitl_bridge.plant.log.state_log import FILE_NAME, StateLog
+from sitl_bridge.plant.log.state_log import FILE_NAME, RowTable, StateLog
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.plant.run import progress_of
 from sitl_bridge.plant.sensing import Diverged
@@ -88,37 +87,21 @@ class Ended:
     """Why it could not go on."""
 
 
-class MemoryLog:
-    """The state log's rows in memory; see `plant.simulation.Recorder`."""
+class MemoryLog(RowTable):
+    """The state log's rows in memory."""
 
     def __init__(self, world: World) -> None:
-        self.table = np.zeros((CHUNK_ROWS, WIDTH))
-        self.count = 0
-        self._keep = kept_columns(len(world.vehicle.rotors), world.vehicle.node_count)
-        self._fill = fill_row.bind(*world.log_sources(), self.table)
+        super().__init__(world)
         self._chunks: list[Array] = []
-        self.names = columns(len(world.vehicle.rotors), world.vehicle.node_count)
 
-    def record(self, time_s: float, world: World) -> None:
-        """Keep one row."""
-        self._fill(self.count, time_s)
-        self.took_row()
-
-    def took_row(self) -> None:
-        """Row `count` of `table` is filled."""
-        self.count += 1
-        if self.count == CHUNK_ROWS:
-            self._flush()
+    def keep(self, rows: Array) -> None:
+        """Keep a chunk."""
+        self._chunks.append(rows)
 
     def rows(self) -> Array:
         """(n, columns): all of them."""
-        self._flush()
+        self.flush()
         return np.concatenate(self._chunks) if self._chunks else np.zeros((0, len(self.names)))
-
-    def _flush(self) -> None:
-        if self.count:
-            self._chunks.append(self.table[: self.count, self._keep])
-            self.count = 0
 
 
 def fly_in_process(
