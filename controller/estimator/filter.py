@@ -238,7 +238,8 @@ class Estimator:
     def reeled(self, rest_length: float, rate: float) -> None:
         """The winch has made the cable so long (m), and goes on at a rate (m/s, positive pays out)."""
         p = self._filter[0]["p"]
-        p["rest_length"] = self._filter_length + rest_length - self.vehicle.cable.rest_length
+        longer = float(self.memory["cable_longer"])  # than told, as a tracker sees it
+        p["rest_length"] = self._filter_length + longer + rest_length - self.vehicle.cable.rest_length
         p["reel_rate"] = rate
 
     def landed(self) -> None:

@@ -178,6 +178,8 @@ MEMORY = np.dtype(
         ("delay_ticks_watched", "i8"),
         ("delay_ticks_compared", "i8"),
         ("delay_found", "i8"),
+        ("cable_longer", "f8"),
+        ("cable_variance", "f8"),
         ("tension", "f8"),
         ("slack_time", "f8"),
         ("swing_due", "f8"),
@@ -225,6 +227,8 @@ MEMORY = np.dtype(
 turned, rates: about x and y, rad/s: what the rotors' moments would have added up to without any delay, and
 the gyroscope; prompt_speed: rad/s, of rotors without it; other delay_*: see `late_commands`; delay_found: in
 ticks, -1: none;
+cable_longer, cable_variance: m and m², by how much pictures show the cable to be longer than told, and how
+well that is known; 0: not yet;
 hook_closed: the gripper is to grab, so that a pull is that of a dropped load; grounded: a vehicle that stands
 does so on the ground, and is not held; contact_time, lying_time: s for which something below has carried the
 vehicle or the load;

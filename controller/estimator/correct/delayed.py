@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from controller.estimator.correct.cable_length import measure_cable
 from controller.estimator.correct.receiver_wander import WANDER, wanders
 from controller.estimator.correct.sensors import book, judge, passes
 from controller.estimator.correct.update import (
@@ -261,6 +262,7 @@ def _slip(f: Filter) -> None:
 def tracker(f: Filter, given: Any) -> None:
     """The load's place relative to the vehicle, m, body FLU, at the time of the picture."""
     m = f.m
+    measure_cable(f, given)
     slot = recall(f, CLONE_LOAD, given.tracker_time)
     if slot < 0:
         return
