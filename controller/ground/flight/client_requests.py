@@ -132,7 +132,7 @@ def fly_pattern(machine: Machine, pattern: Pattern) -> Verdict:
     if machine.stage is Stage.GROUND:
         machine.guidance.take_off(machine.view)
     machine.enter(Mode.ORBIT if isinstance(pattern, Orbit) else Mode.HOLD)
-    machine.guidance.pattern = pattern
+    machine.guidance.in_flight.pattern = pattern
     return OK
 
 

@@ -172,7 +172,8 @@ class Machine:
         self.target = Idle(False)
         before = self.guidance
         self.guidance = Guidance(self.profile, self.parameters, self.mission, self)
-        self.guidance.zones, self.guidance.rally_points = before.zones, before.rally_points
+        self.guidance.zones = before.zones
+        self.guidance.in_flight.rally_points = before.in_flight.rally_points
         self.mission.replace(self.mission.items)
         self.say(INFO, "Rebooted")
 
@@ -201,7 +202,7 @@ class Machine:
     @property
     def pattern(self) -> Pattern | None:
         """The orbit or figure of eight that is flown, or will be after the take-off."""
-        return self.guidance.pattern
+        return self.guidance.in_flight.pattern
 
     # Time
 
@@ -307,8 +308,8 @@ class Machine:
         if mode not in (Mode.LAND, Mode.RTL):
             self.guidance.break_off_landing()
         if self.view is not None and self.armed and self.stage is Stage.FLYING and not again:
-            self.guidance.hold_here(self.view)
-            self.guidance.start(mode)
+            self.guidance.in_flight.hold_here(self.view)
+            self.guidance.in_flight.start(mode)
 
     def set_mode_to(self, mode: Mode) -> None:
         """Have another mode, and say so."""

@@ -63,7 +63,7 @@ def accept_rally(machine: Machine, items: tuple[Item, ...]) -> Fault | None:
     points = rally_points_of(items, machine.profile.origin)
     if isinstance(points, Fault):
         return points
-    machine.guidance.rally_points = points
+    machine.guidance.in_flight.rally_points = points
     return None
 
 

@@ -50,7 +50,7 @@ def move_sticks(machine: Machine, axes: Axes, sender: object, now: float) -> str
 def hear_target(machine: Machine, position: Triple, velocity: Triple) -> None:
     """Where somebody is who may be followed, m and m/s ENU."""
     if machine.view is not None:
-        machine.guidance.followed.hear(position, velocity, machine.view.time)
+        machine.guidance.in_flight.followed.hear(position, velocity, machine.view.time)
 
 
 def setpoint_fresh(machine: Machine, now: float) -> bool:
