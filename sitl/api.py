@@ -22,12 +22,12 @@ from sitl.flights.refusals import check_feasible
 from sitl.flights.scenario import (
     GroundControl,
     Scenario,
-    load_scenario,
     plant_vehicle,
     scenario_vehicle,
     usual_feedback,
     with_agility,
 )
+from sitl.flights.suited_reference import scenario_for
 from sitl.json_values import to_json
 from sitl.report.metrics import flight_metrics, reference_positions
 from sitl.report.outcome import judge
@@ -105,8 +105,12 @@ def fly(
     Raises DescriptionError, with a line for each fault, for what cannot be flown; LawError when the law
     fails in flight.
     """
-    described = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    described = with_agility(described, _checked_agility(agility))
+    agility = _checked_agility(agility)
+    if isinstance(scenario, str):
+        common = [Override(text, "overrides") for text in overrides]
+        described = scenario_for(scenario, vehicle, common, agility).scenario
+    else:
+        described = with_agility(scenario, agility)
     if isinstance(described.reference, GroundControl):
         raise DescriptionError(
             str(scenario), ["ground control takes processes of its own; expected a reference"]
@@ -195,7 +199,7 @@ def _summary(
     if len(states["time_s"]) > 1:
         load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
         reference = reference_positions(path, states["time_s"])
-        seen = sensing_error(told.sensors, facts["feedback"])
+        seen = sensing_error(told, facts["feedback"], facts["rate_hz"])
         summary |= flight_metrics(states["time_s"], load, reference, seen)
         summary["settled"] = bool(summary["settled"] and facts["completed"])
         summary |= judge(states, reference, told, summary)._asdict()

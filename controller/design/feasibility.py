@@ -115,14 +115,38 @@ def _below_ground(path: Path, vehicle: Vehicle) -> list[str]:
     ]
 
 
-def _circle(path: Path, vehicle: Vehicle) -> list[str]:
-    radius, rate = float(path["radius"][0]), abs(float(path["angular_rate"][0]))
+def fastest_rate(path: Path, vehicle: Vehicle) -> tuple[float, str | None]:
+    """The angular rate, rad/s, at which the vehicle can fly this path (1,), and why not at the path's own.
+
+    None: it can at the path's own. The way onto the path is not looked at.
+    """
+    rate = abs(float(path["angular_rate"][0]))
+    excess = _too_fast(path, vehicle)
+    if excess is None:
+        return rate, None
+
+    def flown(at_rate: float) -> bool:
+        other = path.copy()
+        other["angular_rate"] = at_rate
+        return _too_fast(other, vehicle) is None
+
+    return _largest(flown, rate), excess
+
+
+def _too_fast(path: Path, vehicle: Vehicle) -> str | None:
+    """What a circle asks too much of."""
     fastest = FASTEST_CIRCLE * math.sqrt(vehicle.gravity / vehicle.hover_length)
     excess = _excess(demand_of_circle(path, vehicle))
-    if excess is None and rate > fastest:
-        excess = (
+    if excess is None and abs(float(path["angular_rate"][0])) > fastest:
+        return (
             f"the load swings at {_short(fastest / FASTEST_CIRCLE)} rad/s, and follows 1.5 times that at most"
         )
+    return excess
+
+
+def _circle(path: Path, vehicle: Vehicle) -> list[str]:
+    radius, rate = float(path["radius"][0]), abs(float(path["angular_rate"][0]))
+    excess = _too_fast(path, vehicle)
     if excess is None:
         entry = float(planned(path, vehicle)["ramp_time"][0])
         if entry <= LONGEST_ENTRY:
@@ -132,7 +156,7 @@ def _circle(path: Path, vehicle: Vehicle) -> list[str]:
     def flown(of_radius: float, at_rate: float) -> bool:
         other = path.copy()
         other["radius"], other["angular_rate"] = of_radius, at_rate
-        if at_rate > fastest or _excess(demand_of_circle(other, vehicle)) is not None:
+        if _too_fast(other, vehicle) is not None:
             return False
         return float(planned(other, vehicle)["ramp_time"][0]) <= LONGEST_ENTRY
 

@@ -64,11 +64,14 @@ def _what_to_fly(arguments: argparse.Namespace, of_plant: bool = False) -> tuple
         if agility is not None:
             raise DescriptionError("--agility", ["belongs to a scenario's reference; expected --scenario"])
         return load_vehicle(arguments.vehicle or "paper", overrides), None
-    from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle, with_agility
+    from sitl.flights.scenario import load_scenario, plant_vehicle, scenario_vehicle
+    from sitl.flights.suited_reference import scenario_for
 
-    scenario = with_agility(load_scenario(arguments.scenario), agility)
-    its_vehicle = plant_vehicle if of_plant else scenario_vehicle
-    return its_vehicle(scenario, arguments.vehicle, overrides), scenario
+    if of_plant:
+        scenario = load_scenario(arguments.scenario)
+        return plant_vehicle(scenario, arguments.vehicle, overrides), scenario
+    scenario = scenario_for(arguments.scenario, arguments.vehicle, overrides, agility).scenario
+    return scenario_vehicle(scenario, arguments.vehicle, overrides), scenario
 
 
 def _overrides(arguments: argparse.Namespace) -> list[str]:
@@ -229,12 +232,17 @@ def _fly(arguments: argparse.Namespace) -> int:
     from controller.ground.link.ports import STATION_LOCAL
     from sitl.flights.flight import FlightOptions, fly
     from sitl.flights.hold import check_design, ground_arguments, hold
-    from sitl.flights.scenario import GroundControl, load_scenario, with_agility
+    from sitl.flights.scenario import GroundControl
+    from sitl.flights.suited_reference import scenario_for
     from sitl.report.summary import written
     from sitl.terminal.summary import table
     from sitl_bridge.mavlink.links.address import Address
 
-    scenario = with_agility(load_scenario(arguments.scenario), arguments.agility)
+    scenario, notes = scenario_for(
+        arguments.scenario, arguments.vehicle, _overrides(arguments), arguments.agility
+    )
+    for note in notes:
+        print(f"fly: {note}", file=sys.stderr, flush=True)
     with prints_to_stderr(arguments.law is not None):
         law = chosen_law(arguments, scenario)
     if arguments.over is not None:

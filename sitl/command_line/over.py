@@ -124,7 +124,8 @@ def fly_over_stack(
 
     A live flight ends when it is stopped, with exit code 0.
     """
-    from sitl.flights.scenario import GroundControl, load_scenario
+    from sitl.flights.scenario import GroundControl
+    from sitl.flights.suited_reference import scenario_for
     from sitl.over.flight import OverFlight, fly_over
     from sitl.over.flight import table as table_of_step
     from sitl.report.summary import written
@@ -133,7 +134,7 @@ def fly_over_stack(
     for name, why in NOT_OVER_A_STACK.items():
         if getattr(arguments, name) != USUAL.get(name):
             raise DescriptionError(f"--{name.replace('_', '-')}", [f"does not go with --over: {why}"])
-    scenario = load_scenario(arguments.scenario)
+    scenario = scenario_for(arguments.scenario, arguments.vehicle, overrides).scenario  # `fly` has told
     live = _live_ports(arguments) if isinstance(scenario.reference, GroundControl) else None
     if live is None and arguments.gcs is not None:
         raise DescriptionError("--gcs", ["goes with a scenario that leaves the load to it, such as hold"])

@@ -116,7 +116,11 @@ def write_report(
         if len(log["time_s"]) > 1:
             reference = None if path is None else reference_positions(path, log["time_s"])
             if reference is not None:
-                seen = 0.0 if described is None else sensing_error(described.sensors, facts["feedback"])
+                seen = (
+                    0.0
+                    if described is None
+                    else sensing_error(described, facts["feedback"], facts["rate_hz"])
+                )
                 summary |= flight_metrics(log["time_s"], positions(log, "load"), reference, seen)
             summary["settled"] = bool(summary["settled"] and facts.get("completed"))
             if described is not None:
