@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from controller.estimator.correct.sensors import failed, measured_pull, saturated
+from controller.estimator.correct.live_samples import failed
+from controller.estimator.correct.sensors import measured_pull, saturated
 from controller.estimator.correct.update import set_part
 from controller.estimator.predict.forces import cable
 from controller.estimator.records import (

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from controller.estimator.correct.sensors import failed
+from controller.estimator.correct.live_samples import failed
 from controller.estimator.records import (
     DELAY_HISTORY,
     DELAY_STEP,

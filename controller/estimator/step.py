@@ -10,16 +10,9 @@ import numpy as np
 from controller.estimator.alignment import align, start_hanging
 from controller.estimator.contact_modes import leave_ground, lose_track, release, stand, watch
 from controller.estimator.correct.delayed import OUTAGE, gps, remember, tracker
+from controller.estimator.correct.pseudo_measurements import load_at_rest, on_ground, rest
 from controller.estimator.correct.receiver_wander import fade_wander
-from controller.estimator.correct.sensors import (
-    accelerometer,
-    barometer,
-    gyroscope,
-    load_at_rest,
-    magnetometer,
-    on_ground,
-    rest,
-)
+from controller.estimator.correct.sensors import accelerometer, barometer, gyroscope, magnetometer
 from controller.estimator.dropped_load import drop
 from controller.estimator.late_commands import watch_delay
 from controller.estimator.predict.process import predict

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 from controller.estimator.correct.cable_length import measure_cable
+from controller.estimator.correct.gating import accept, gate_ratio, record_nis
 from controller.estimator.correct.receiver_wander import WANDER, wanders
-from controller.estimator.correct.sensors import book, judge, passes
 from controller.estimator.correct.update import (
     CORRECTION,
     begin,
@@ -193,8 +193,8 @@ def gps(f: Filter, given: Any) -> None:
                 innovation = given.gps_velocity[axis] - f.z[k]
                 std = given.gps_velocity_std[axis]
             variance = remembered_variance(f, k, also) + std * std
-            worst = max(worst, judge(f, sensor, axis, innovation, variance))
-        if not passes(f, sensor, worst):
+            worst = max(worst, gate_ratio(f, sensor, axis, innovation, variance))
+        if not accept(f, sensor, worst):
             continue
         if half == 0:
             _suspect_barometer(f, m.normalised[sensor, 2])
@@ -205,7 +205,7 @@ def gps(f: Filter, given: Any) -> None:
             squares += fuse_remembered(f, k, also, m.innovation[sensor, axis], std * std)
         _slip(f)
         inject(f)
-        book(f, sensor, squares, 3)
+        record_nis(f, sensor, squares, 3)
     forget(f, CLONE_MOTION, given.gps_time)
 
 
@@ -273,12 +273,12 @@ def tracker(f: Filter, given: Any) -> None:
         std = given.tracker_std[axis]
         innovation = given.tracker[axis] - f.z[base + axis]
         variance = f.Pzz[base + axis, base + axis] + std * std
-        worst = max(worst, judge(f, TRACKER, axis, innovation, variance))
-    if passes(f, TRACKER, worst):
+        worst = max(worst, gate_ratio(f, TRACKER, axis, innovation, variance))
+    if accept(f, TRACKER, worst):
         for axis in range(3):
             std = given.tracker_std[axis]
             k = base + axis
             squares += fuse_remembered(f, k, k, m.innovation[TRACKER, axis], std * std)
         inject(f)
-        book(f, TRACKER, squares, 3)
+        record_nis(f, TRACKER, squares, 3)
     forget(f, CLONE_LOAD, given.tracker_time)

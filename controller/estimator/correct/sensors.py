@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from controller.estimator.correct.gating import GARBAGE, accept, record_nis, row_ratio
+from controller.estimator.correct.live_samples import note_sample
 from controller.estimator.correct.sudden_offset import note_step_of_force, note_step_of_rate, note_usual_rate
-from controller.estimator.correct.update import ROW, begin, fuse, inject, predicted_variance
+from controller.estimator.correct.update import ROW, begin, fuse, inject
 from controller.estimator.predict.forces import cable, drag_rate
 from controller.estimator.predict.rotation import matrix
 from controller.estimator.records import (
@@ -31,7 +33,6 @@ from controller.estimator.records import (
     X_FORCE,
     X_GYRO_BIAS,
     X_LOAD,
-    X_LOAD_VELOCITY,
     X_MAG_BIAS,
     X_POSITION,
     X_RATES,
@@ -40,104 +41,6 @@ from controller.estimator.records import (
     Filter,
 )
 from sitl_bridge.compiled import kernel
-
-HEIGHT_STD = 0.3
-"""m, of one look at the ground's height: taken at every tick, it is a soft hold and no new fact each time."""
-STALE_SAMPLES = 50
-"""So many identical samples, and a sensor counts as stuck: a live one has noise in every sample."""
-STALE_INERTIAL_SAMPLES = 5
-"""The same in flight for accelerometer and gyroscope, on which the next samples of the flight depend."""
-
-
-@kernel
-def passes(f: Filter, sensor: int, ratio: float) -> bool:
-    """Book a gate's verdict; ratio: innovation over gate, the largest of the axes (1 is the limit)."""
-    m = f.m
-    m.test_ratio[sensor] = ratio
-    if ratio <= 1.0:
-        m.rejected_in_row[sensor] = 0
-        m.last_used[sensor] = m.time
-        return True
-    m.rejected[sensor] += 1
-    m.rejected_in_row[sensor] += 1
-    return False
-
-
-@kernel
-def book(f: Filter, sensor: int, squares: float, degrees: int) -> None:
-    """Add to the consistency statistics: normalised innovations squared and their degrees of freedom."""
-    f.m.nis_sum[sensor] += squares
-    f.m.nis_count[sensor] += degrees
-
-
-NINETY_FIVE = 1.959964
-"""Standard deviations within which 95 % of a normal distribution lie."""
-
-
-GARBAGE = 1e6
-"""Standard deviations beyond which, and for what is not a number, a sample is no measurement at all."""
-
-
-@kernel
-def judge(f: Filter, sensor: int, axis: int, innovation: float, variance: float) -> float:
-    """Book an innovation of this variance; returns its size as a part of the gate."""
-    m = f.m
-    normalised = innovation / math.sqrt(variance)
-    if not abs(normalised) < GARBAGE:  # also where it is not a number
-        innovation, normalised = 0.0, GARBAGE
-    m.innovation[sensor, axis] = innovation
-    m.normalised[sensor, axis] = normalised
-    m.seen[sensor] += 1
-    if abs(normalised) < NINETY_FIVE:
-        m.within[sensor] += 1
-    return float(abs(normalised) / f.p.gate[sensor])
-
-
-@kernel
-def ratio_of(f: Filter, sensor: int, axis: int, innovation: float, noise: float) -> float:
-    """`judge` for the present row, which is cleared; noise: variance of the measurement itself."""
-    return float(judge(f, sensor, axis, innovation, predicted_variance(f) + noise))
-
-
-ROUGH = 40.0
-"""Of a live inertial sensor's own noise: what changes from sample to sample so much more is garbage."""
-ROUGHNESS_BLEND = 0.2
-ROUGHEST = 100.0
-"""A single jump, however far, is a knock."""
-LEAST_ACCELEROMETER_NOISE, LEAST_GYROSCOPE_NOISE = 0.3, 0.015
-"""m/s², rad/s: a quieter one would be rough wherever the cable snatches."""
-
-
-@kernel
-def note_sample(f: Filter, sensor: int, measured: Any) -> bool:
-    """Compare a sample with those before; whether the sensor has failed."""
-    m, same, roughest = f.m, True, 0.0
-    for axis in range(3):
-        change = measured[axis] - m.last_sample[sensor, axis]
-        same = same and not abs(change) > 1e-9 * abs(measured[axis])
-        roughest = max(roughest, abs(change - m.last_change[sensor, axis]))
-        m.last_sample[sensor, axis], m.last_change[sensor, axis] = measured[axis], change
-    m.stale_count[sensor] = m.stale_count[sensor] + 1 if same else 0
-    if sensor != MAGNETOMETER:
-        least = LEAST_ACCELEROMETER_NOISE if sensor == ACCELEROMETER else LEAST_GYROSCOPE_NOISE
-        # A second difference of white noise has the standard deviation sqrt(1 + 4 + 1).
-        roughest /= math.sqrt(6.0) * max(f.p.sensor_std[sensor], least)
-        if not roughest < ROUGHEST:  # also where it is not a number
-            roughest = ROUGHEST
-        m.roughness[sensor] += ROUGHNESS_BLEND * (roughest - m.roughness[sensor])
-    return failed(f, sensor)
-
-
-@kernel
-def failed(f: Filter, sensor: int) -> bool:
-    """Whether a sensor repeats itself or, an inertial one, shows garbage; at rest they may repeat."""
-    m = f.m
-    if sensor == MAGNETOMETER:
-        return bool(m.stale_count[sensor] >= STALE_SAMPLES)
-    return bool(
-        m.vehicle_mode == FLYING
-        and (m.stale_count[sensor] >= STALE_INERTIAL_SAMPLES or m.roughness[sensor] > ROUGH)
-    )
 
 
 @kernel
@@ -165,11 +68,11 @@ def accelerometer(f: Filter, measured: Any) -> None:
         if saturated(f, measured[axis]):
             continue
         innovation = measured[axis] - _accelerometer_row(f, axis)
-        worst = max(worst, ratio_of(f, ACCELEROMETER, axis, innovation, noise))
+        worst = max(worst, row_ratio(f, ACCELEROMETER, axis, innovation, noise))
         used += 1
     if used < 3:
         m.rejected[ACCELEROMETER] += 1
-    if not note_step_of_force(f) and not passes(f, ACCELEROMETER, worst):
+    if not note_step_of_force(f) and not accept(f, ACCELEROMETER, worst):
         return
     taut = m.tension > 0.0 and not p.two_way and m.vehicle_mode == FLYING
     before = along_cable(f)
@@ -179,7 +82,7 @@ def accelerometer(f: Filter, measured: Any) -> None:
         innovation = measured[axis] - _accelerometer_row(f, axis)
         squares += fuse(f, innovation, noise)
     inject(f)
-    book(f, ACCELEROMETER, squares, used)
+    record_nis(f, ACCELEROMETER, squares, used)
     if taut:
         allow_for_slack(f, before)
 
@@ -269,11 +172,11 @@ def gyroscope(f: Filter, measured: Any) -> None:
     for axis in range(3):
         innovation = measured[axis] - x[X_RATES + axis] - x[X_GYRO_BIAS + axis]
         f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
-        worst = max(worst, ratio_of(f, GYROSCOPE, axis, innovation, noise))
+        worst = max(worst, row_ratio(f, GYROSCOPE, axis, innovation, noise))
     suspect_moments(f)
     # Rates that the known moments do not explain (a collision, a lost rotor) are real: the gate on them only
     # widens the rates, it does not refuse what the gyroscope sees for long.
-    if not passes(f, GYROSCOPE, worst):
+    if not accept(f, GYROSCOPE, worst):
         if worst > 0.01 * GARBAGE:
             return
         note_step_of_rate(f)
@@ -285,7 +188,7 @@ def gyroscope(f: Filter, measured: Any) -> None:
         f.vectors[ROW, RATES + axis], f.vectors[ROW, GYRO_BIAS + axis] = 1.0, 1.0
         squares += fuse(f, m.innovation[GYROSCOPE, axis], noise)
     inject(f)
-    book(f, GYROSCOPE, squares, 3)
+    record_nis(f, GYROSCOPE, squares, 3)
 
 
 MOMENT_BLEND = 0.02
@@ -315,44 +218,6 @@ def suspect_moments(f: Filter) -> None:
 
 
 @kernel
-def rest(f: Filter) -> None:
-    """Pseudo-measurements of a vehicle that stands: no velocity, no turning, the load at rest too."""
-    x = f.x
-    begin(f)
-    for axis in range(3):
-        f.vectors[ROW, VELOCITY + axis] = 1.0
-        fuse(f, -x[X_VELOCITY + axis], 0.05**2)
-        f.vectors[ROW, RATES + axis] = 1.0
-        fuse(f, -x[X_RATES + axis], 0.02**2)
-        f.vectors[ROW, LOAD_VELOCITY + axis] = 1.0
-        fuse(f, -x[X_LOAD_VELOCITY + axis], 0.05**2)
-    inject(f)
-
-
-@kernel
-def on_ground(f: Filter) -> None:
-    """Pseudo-measurement of a vehicle that stands on the ground: its height."""
-    begin(f)
-    f.vectors[ROW, POSITION + 2] = 1.0
-    fuse(f, f.p.standing_height - f.x[X_POSITION + 2], HEIGHT_STD**2)
-    inject(f)
-
-
-@kernel
-def load_at_rest(f: Filter) -> None:
-    """Pseudo-measurements of a load on the ground: its own velocity is zero, and its height."""
-    p, x = f.p, f.x
-    begin(f)
-    for axis in range(3):
-        f.vectors[ROW, VELOCITY + axis], f.vectors[ROW, LOAD_VELOCITY + axis] = 1.0, 1.0
-        fuse(f, -x[X_VELOCITY + axis] - x[X_LOAD_VELOCITY + axis], 0.1**2)
-    if p.has_ground:
-        f.vectors[ROW, POSITION + 2], f.vectors[ROW, LOAD + 2] = 1.0, 1.0
-        fuse(f, p.lying_height - x[X_POSITION + 2] - x[X_LOAD + 2], HEIGHT_STD**2)
-    inject(f)
-
-
-@kernel
 def magnetometer(f: Filter, measured: Any) -> None:
     """The heading in a field vector, body, any unit.
 
@@ -377,12 +242,12 @@ def magnetometer(f: Filter, measured: Any) -> None:
     noise = p.sensor_std[MAGNETOMETER] * p.sensor_std[MAGNETOMETER]
     begin(f)
     _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
-    if not passes(f, MAGNETOMETER, ratio_of(f, MAGNETOMETER, 0, innovation, noise)):
+    if not accept(f, MAGNETOMETER, row_ratio(f, MAGNETOMETER, 0, innovation, noise)):
         return
     _magnetometer_row(f, tilt * fx, tilt * fy, r00, r10, r20, r01, r11, r21, r02, r12, r22)
     squares = fuse(f, innovation, noise)
     inject(f)
-    book(f, MAGNETOMETER, squares, 1)
+    record_nis(f, MAGNETOMETER, squares, 1)
 
 
 @kernel
@@ -419,12 +284,12 @@ def barometer(f: Filter, altitude: float) -> None:
     innovation = altitude - f.x[X_POSITION + 2] - f.x[X_BARO_OFFSET]
     begin(f)
     f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
-    if not passes(f, BAROMETER, ratio_of(f, BAROMETER, 0, innovation, noise)):
+    if not accept(f, BAROMETER, row_ratio(f, BAROMETER, 0, innovation, noise)):
         return
     f.vectors[ROW, POSITION + 2], f.vectors[ROW, BARO_OFFSET] = 1.0, 1.0
     squares = fuse(f, innovation, noise)
     inject(f)
-    book(f, BAROMETER, squares, 1)
+    record_nis(f, BAROMETER, squares, 1)
 
 
 @kernel
