@@ -29,6 +29,7 @@ from sitl_bridge.plant.physics.cables.flexible_cable import LINEAR, flexible_cab
 from sitl_bridge.plant.physics.cables.hoist import (
     begin_reeling,
     end_reeling,
+    hoist_rests,
     take_hoist_commands,
     work_gripper,
 )
@@ -375,11 +376,12 @@ def advance(
     rotor_decay(p, 0.5 * step, work[_DECAY])
     force_row, force_age = first_force // force_hold, first_force % force_hold
     wind_row, wind_age = first_wind // wind_hold, first_wind % wind_hold
+    hoist_works = p.has_hoist and not hoist_rests(p)
     for _ in range(steps):
-        if p.has_hoist:
+        if hoist_works:
             begin_reeling(p, x, inner, step)
         whole_step(p, x, inner, command, forces[force_row], winds[wind_row], step, work)
-        if p.has_hoist:
+        if hoist_works:
             end_reeling(p, step)
             work_gripper(p, x, inner, step)
         force_age, wind_age = force_age + 1, wind_age + 1

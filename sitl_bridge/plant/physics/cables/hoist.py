@@ -96,6 +96,15 @@ def take_hoist_commands(p: Any, controls: Array) -> None:
 
 
 @kernel
+def hoist_rests(p: Any) -> bool:
+    """Whether gripper and winch do nothing, and go on doing so while their commands are held."""
+    h = p.hoist
+    if h.has_winch and (p.reel_rate != 0.0 or h.winch != 0.0 or h.clutch_open):
+        return False
+    return not (h.has_gripper and (h.gripper < 0.0 or h.releasing != 0.0 or h.released))
+
+
+@kernel
 def begin_reeling(p: Any, x: Array, inner: Array, step: float) -> None:
     """The rate of a step of `step` seconds, and the first half of its change of the rest length.
 
