@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from sitl.doctor.run import examine
 from sitl.exit_codes import FAILED
 
 
@@ -22,4 +21,6 @@ def add_doctor(commands: Any) -> None:
 
 def run_doctor(arguments: argparse.Namespace) -> int:
     """Examine; exit code 1 when something prevents a flight."""
+    from sitl.doctor.run import examine
+
     return 0 if examine(arguments.json) else FAILED
