@@ -1,9 +1,13 @@
 """Settings of every test."""
 
+import os
 from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+# As `sitl` itself has it, and before NumPy is there: threads for matrices of 20 rows only spin.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # No deadline, and no complaint of slow data: a busy machine is no fault. The same examples each time: a
 # failure is never the weather's; `--hypothesis-profile=search` looks for new ones.

@@ -10,12 +10,12 @@ from controller.design.catalogue import design
 from controller.design.margins import closed_loop_matrix, delay_margin, spectral_radius
 from controller.design.model import LinearModel, actuated_model
 from controller.design.names import DESIGNS
-from controller.law.control_law import WORK, Design, engaged_memory, remember
-from controller.law.control_step import law_step
+from controller.law.control_law import WORK, Design, engaged_memory
 from controller.law.reference import setpoint
 from controller.law.state import LOAD_POSITION, STATE_SIZE, Array
 from sitl.studies.random_vehicles import random_vehicle
 from sitl_bridge.vehicle.description import Vehicle
+from tests.controller.compiled_law import given_step
 from tests.controller.fleet import FLEET, attributes, delayed
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -29,8 +29,9 @@ def flown(
 
     The input is a list of (time, command) that the plant looks up, its delayed entries `extra` s later.
     """
-    law, memory = attributes(record), attributes(engaged_memory(np.zeros(3)))
-    work, path = attributes(np.zeros(1, dtype=WORK)), attributes(setpoint(ORIGIN, ORIGIN))
+    law, work = attributes(record), np.zeros(1, dtype=WORK)
+    estimate = np.zeros(STATE_SIZE)
+    step = given_step.bind(record, engaged_memory(np.zeros(3)), setpoint(ORIGIN, ORIGIN), work, estimate)
     period, told = float(law.period), int(law.delay)
     hover = np.array(law.hover_state)
     n, m = model.B.shape
@@ -52,10 +53,9 @@ def flown(
     pieces = (rest, period - rest) if rest > 0 else (period,)
     loads = [x[LOAD_POSITION].copy()]
     for tick in range(ticks):
-        law_step(law, memory, path, x[:STATE_SIZE] + hover, work)
-        work.achieved[:] = work.wrench
-        remember(law, memory, work)
-        commands.append(work.wrench - law.hover_wrench)
+        estimate[:] = x[:STATE_SIZE] + hover
+        step()
+        commands.append(work["wrench"][0] - law.hover_wrench)
         time = tick * period
         for piece in pieces:
             if piece not in transition:
