@@ -125,7 +125,7 @@ class EstimateFeedback:
         self.guessing = in_flight
         self.fresh = False
 
-    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+    def update(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick, once it is aligned and good enough to fly on."""
         if reader.begun:
             self._align(in_flight=False)
@@ -165,7 +165,7 @@ class EstimateFeedback:
             self._check()
         return None if self._lost else estimate
 
-    def flown(self, controls: Array, armed: bool) -> None:
+    def note_command(self, controls: Array, armed: bool) -> None:
         """Note what the rotors are told; the first time armed, that the vehicle flies."""
         if not armed:
             self.estimator.command(self._standing)
@@ -293,10 +293,10 @@ class TruthBesideEstimate(TruthFeedback):
         self._patience = round(LONGEST_WAIT * rate_hz)
         self._begun = False
 
-    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+    def update(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The truth, from when the estimator has aligned; it is not waited for longer than LONGEST_WAIT."""
-        estimate = self._beside.take(time_usec, tick, reader)
-        truth = super().take(time_usec, tick, reader)
+        estimate = self._beside.update(time_usec, tick, reader)
+        truth = super().update(time_usec, tick, reader)
         if not self._begun and truth is not None:
             self._patience -= 1
             waits = self._beside.fresh and self._patience > 0  # not where it may be in flight
@@ -307,9 +307,9 @@ class TruthBesideEstimate(TruthFeedback):
         """The estimator needs its part of every tick."""
         return None
 
-    def flown(self, controls: Array, armed: bool) -> None:
+    def note_command(self, controls: Array, armed: bool) -> None:
         """The estimator has to know."""
-        self._beside.flown(controls, armed)
+        self._beside.note_command(controls, armed)
 
     def restart(self) -> None:
         """Align anew."""

@@ -1,4 +1,4 @@
-"""What the law flies on: the plant's truth, or (`estimate_feedback`) the estimate from its sensors."""
+"""What the law flies on: the plant's truth, or (`feedback.estimate`) the estimate from its sensors."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Feedback(Protocol):
     loop_delay: int | None
     """Ticks after which commands act, where they were found to act later than told; else None."""
 
-    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+    def update(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The estimate at a new tick; None while there is none to fly on."""
 
-    def flown(self, controls: Array, armed: bool) -> None:
+    def note_command(self, controls: Array, armed: bool) -> None:
         """The tick was answered with these controls (16,); disarmed, the rotors stand."""
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
@@ -59,11 +59,11 @@ class TruthFeedback:
     needs_truth = True
     loop_delay: int | None = None
 
-    def take(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
+    def update(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The state that the plant says it is in."""
         return reader.estimate if tick.truth else None
 
-    def flown(self, controls: Array, armed: bool) -> None:
+    def note_command(self, controls: Array, armed: bool) -> None:
         """Truth does not need to know."""
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:

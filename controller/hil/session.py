@@ -187,7 +187,7 @@ class HilSession:
 
     def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
         at_our_rate = self._tick_rate is None or self._tick_rate.fits(time_usec)
-        estimate = self._feedback.take(time_usec, tick, self._reader)
+        estimate = self._feedback.update(time_usec, tick, self._reader)
         self._follow_delay()
         if estimate is not None and at_our_rate:
             before = self._autopilot.armed
@@ -198,7 +198,7 @@ class HilSession:
                 self._say(
                     "disarmed" if before else f"plant and {self._feedback.name} are there: armed, flying"
                 )
-            self._feedback.flown(self._writer.controls, self._autopilot.armed)
+            self._feedback.note_command(self._writer.controls, self._autopilot.armed)
             self.steps += 1
             if self._terms_log is not None and self._autopilot.armed:
                 self._terms_log.tick(time_usec, self._autopilot)
