@@ -12,6 +12,7 @@ from controller.design.lqr import Weights, block_diagonal, sampled_gain, sampled
 from controller.design.model import actuated_model, rotor_time_constant, with_integrator
 from controller.design.names import DESIGNS, FOR_ESTIMATES
 from controller.design.remembered import remembered
+from controller.design.stiffness import FASTEST, MARGIN, bears, lag_in_answer, stiffest
 from controller.law.control_law import DESIGN, FEEDFORWARD, INTEGRATOR, STATE, Design
 from controller.law.flatness import body
 from controller.law.state import (
@@ -61,6 +62,19 @@ class Emphasis(NamedTuple):
 
 
 EVEN = Emphasis()
+STIFFEST = Emphasis(
+    load_position=16.0,
+    vehicle_velocity=0.01,
+    load_velocity=4.0,
+    body_rates=0.1,
+    attitude=0.1,
+    integral=16.0,
+    thrust=0.1,
+    moments=0.1,
+)
+"""The stiffest law that is of use; between it and `EVEN` factors go geometrically."""
+MOST_STIFF = 0.92
+"""Of the nonlinear law. The linear one, made stiffer, loses V.B with another load and cable."""
 
 
 def default_weights(vehicle: Vehicle, emphasis: Emphasis = EVEN, loaded: bool = True) -> Weights:
@@ -103,6 +117,32 @@ def emphasised(weights: Weights, emphasis: Emphasis) -> Weights:
     return Weights(weights.Q * on_states[: len(weights.Q)], weights.R * on_inputs)
 
 
+def times(one: Emphasis, other: Emphasis) -> Emphasis:
+    """Factors on top of factors."""
+    return Emphasis(*(a * b for a, b in zip(one, other, strict=True)))
+
+
+def stiffened(share: float) -> Emphasis:
+    """The factors of a stiffness from 0 to 1, see `stiffness`."""
+    return Emphasis(*(factor**share for factor in STIFFEST))
+
+
+def stiffness(vehicle: Vehicle, rate_hz: float) -> float:
+    """How stiff the nonlinear law is for a vehicle, a loop rate and the delay that it is told of."""
+    return float(_stiffness(linearised(vehicle), rate_hz)[0])
+
+
+@remembered(64)
+def _stiffness(vehicle: Vehicle, rate_hz: float) -> Array:
+    model = actuated_model(vehicle)
+
+    def good(share: float) -> bool:
+        record = design_for(vehicle, rate_hz, default_weights(vehicle, stiffened(share)), FEEDFORWARD)
+        return lag_in_answer(record, vehicle.gravity) <= FASTEST and bears(model, record, MARGIN)
+
+    return np.array([stiffest(good, MOST_STIFF)])
+
+
 def emphasis_of(vehicle: Vehicle) -> Emphasis:
     """The factors of a vehicle description's `[law]`."""
     return Emphasis(**vehicle.law.model_dump())
@@ -116,6 +156,8 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     """
     emphasis = emphasis_of(vehicle)
     if name in FOR_ESTIMATES:
+        if name == "geometric":
+            emphasis = times(emphasis, stiffened(stiffness(vehicle, rate_hz)))
         record = design_for(vehicle, rate_hz, default_weights(vehicle, emphasis), FEEDFORWARD)
         record["adapts"] = 1
         record["geometric"] = name == "geometric"
@@ -142,7 +184,7 @@ def guided_designs(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis = EVEN) 
 
     emphasis: on top of the description's `[law]`.
     """
-    emphasis = Emphasis(*(a * b for a, b in zip(emphasis, emphasis_of(vehicle), strict=True)))
+    emphasis = times(emphasis, emphasis_of(vehicle))
     loaded, alone = (
         design_for(vehicle, rate_hz, default_weights(vehicle, emphasis, with_load), FEEDFORWARD, with_load)
         for with_load in (True, False)

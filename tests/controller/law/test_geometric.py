@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import sitl
 from controller.design.catalogue import LARGEST_LEAN, design
 from controller.design.motion.ramp import planned
-from controller.law.control_law import WORK, engaged_memory
+from controller.law.control_law import WORK, Design, engaged_memory
 from controller.law.control_step import law_step
 from controller.law.reference import Path, circle, setpoint
 from controller.law.rotations import seen_from, swung, turn_between
@@ -46,8 +46,8 @@ lean = st.floats(-1.4, 1.4)
 class Flown:
     """The law as plain Python at one moment of a path."""
 
-    def __init__(self, name: str, vehicle: Vehicle, path: Path, seconds: float) -> None:
-        self.law, self.path = attributes(design(name, vehicle, RATE)), attributes(path)
+    def __init__(self, record: Design, path: Path, seconds: float) -> None:
+        self.law, self.path = attributes(record), attributes(path)
         self.memory, self.work = attributes(engaged_memory(np.zeros(3))), attributes(np.zeros(1, dtype=WORK))
         self.ticks = round(seconds * RATE)
         self.integral = np.zeros(3)
@@ -87,7 +87,7 @@ def test_the_step_is_its_formulas() -> None:
     """On a circle, well away from it; everything on whole vectors."""
     path = planned(circle(ORIGIN, 5.0, 1.0, ORIGIN), PAPER)
     path["yaw"] = 0.7
-    flown = Flown("geometric", PAPER, path, 9.0)
+    flown = Flown(design("geometric", PAPER, RATE), path, 9.0)
     flown.integral = np.array([0.02, -0.03, 0.01])
     law, work = flown.law, flown.work
     flown(np.zeros(STATE_SIZE) + 0.1)
@@ -144,10 +144,13 @@ def test_the_step_is_its_formulas() -> None:
 
 
 @pytest.mark.parametrize("vehicle", ["paper", "paper, 10 m", "small, lag"])
-def test_at_hover_it_is_the_default_design_to_first_order(vehicle: str) -> None:
+def test_at_hover_it_is_the_linear_law_of_its_gains_to_first_order(vehicle: str) -> None:
     """So that what `margins` finds of the gains holds for it, too."""
     told = delayed(FLEET[vehicle], 1)
-    laws = [Flown(name, told, setpoint(TARGET, TARGET), 5.0) for name in ("default", "geometric")]
+    record = design("geometric", told, RATE)
+    linear = record.copy()
+    linear["geometric"] = 0
+    laws = [Flown(one, setpoint(TARGET, TARGET), 5.0) for one in (linear, record)]
     hover = np.zeros(STATE_SIZE)
     hover[LOAD_POSITION] = TARGET
     hover[VEHICLE_POSITION] = np.add(TARGET, (0.0, 0.0, told.hover_length))
@@ -175,7 +178,7 @@ def test_no_error_asks_for_more_than_the_largest_lean(away: float) -> None:
     moments = []
     for lean in (LARGEST_LEAN, 0.0):
         estimate[EULER_ANGLES] = (0.0, lean, 0.0)
-        moments.append(Flown("geometric", vehicle, setpoint(ORIGIN, ORIGIN), 0.0)(estimate)[2])
+        moments.append(Flown(design("geometric", vehicle, RATE), setpoint(ORIGIN, ORIGIN), 0.0)(estimate)[2])
     assert abs(moments[0]) < 1e-6 * moments[1]
 
 
@@ -184,7 +187,7 @@ def test_a_vehicle_on_its_back_stops_its_rotors_and_turns_over() -> None:
     estimate[VEHICLE_POSITION] = 0.0, 0.0, PAPER.hover_length
     for roll in (2.9, -2.9):
         estimate[EULER_ANGLES] = roll, 0.0, 0.0
-        wrench = Flown("geometric", PAPER, setpoint(ORIGIN, ORIGIN), 0.0)(estimate)
+        wrench = Flown(design("geometric", PAPER, RATE), setpoint(ORIGIN, ORIGIN), 0.0)(estimate)
         assert wrench[0] < 0.0
         assert wrench[1] * roll < 0.0
 
@@ -198,7 +201,22 @@ def test_it_flies_v_b_with_every_vehicle_and_bears_20_ms(vehicle: Vehicle) -> No
     assert nominal["settling_time_1cm_s"] < 4.5  # type: ignore[operator]
     assert nominal["overshoot_pct"] < 0.5  # type: ignore[operator]
     assert late["settled"]
-    assert late["overshoot_pct"] < 4.0  # type: ignore[operator]
+    assert late["overshoot_pct"] < 5.0  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(("length", "most"), [("1", 0.017), ("10", 0.03)])
+def test_it_holds_the_load_against_five_newtons_of_noise(length: str, most: float) -> None:
+    flight = sitl.fly(
+        "hover",
+        design="geometric",
+        overrides=[f"cable.rest_length={length}"],
+        plant_overrides=["disturbance.force_std=5", "disturbance.acts_on=load"],
+        duration_s=40.0,
+        seed=1,
+    )
+    load = np.stack([flight.states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    errors = np.linalg.norm(load - flight.reference, axis=1)[flight.states["time_s"] >= 8.0]
+    assert np.sqrt(np.mean(errors**2)) <= most
 
 
 @pytest.mark.parametrize("vehicle", ["paper", "paper, 10 m"])

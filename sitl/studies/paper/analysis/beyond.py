@@ -57,6 +57,13 @@ CIRCLE_TO_REACH = {"described": 1e-3, "heavy": 1e-2, "light": 1e-2}
 """m, rms"""
 
 
+NOISY, NOISE_FROM = 40.0, 8.0
+"""s, of a hover under noise, and from when it is judged"""
+NOISE = ("disturbance.force_std=5", "disturbance.acts_on=load")
+NOISE_TO_REACH = {"1": 0.017, "10": 0.03}
+"""m, rms"""
+
+
 def laws(quick: bool) -> tuple[str, ...]:
     """Those that fly; all are in the tables of the linear loop."""
     return LAWS[1:] if quick else LAWS
@@ -77,6 +84,11 @@ def cables(quick: bool) -> tuple[str, ...]:
     return ("nylon",) if quick else tuple(CABLES)
 
 
+def noisy_lengths(quick: bool) -> tuple[str, ...]:
+    """The cables that fly under noise."""
+    return LENGTHS[1:] if quick else LENGTHS
+
+
 def step_request(law: str, length: str, plant: str) -> Request:
     """A flight to V.B's set-point."""
     known = law == "paper" and plant == "described"  # figure 10 has it
@@ -87,6 +99,11 @@ def step_request(law: str, length: str, plant: str) -> Request:
 def circle_request(law: str, length: str, plant: str) -> Request:
     """A flight round V.C's circle."""
     return Request("circle", law, CIRCLE, (f"cable.rest_length={length}",), PLANTS[plant].overrides)
+
+
+def noise_request(law: str, length: str) -> Request:
+    """A hover under V.A's noise of 5 N."""
+    return Request("hover", law, NOISY, (f"cable.rest_length={length}",), NOISE, seed=1)
 
 
 def cable_request(cable: str) -> Request:
@@ -106,4 +123,5 @@ def requests(quick: bool) -> list[Request]:
         for length in lengths(plant, quick):
             out += [step_request(law, length, plant) for law in flown_laws(plant, quick)]
             out += [circle_request(law, length, plant) for law in LAWS[2:]]
+    out += [noise_request(law, length) for length in noisy_lengths(quick) for law in LAWS[2:]]
     return [*out, *(cable_request(cable) for cable in cables(quick))]

@@ -15,6 +15,8 @@ from sitl.studies.paper.analysis.beyond import (
     EFFORT,
     LAWS,
     NO_FIGURE,
+    NOISE_FROM,
+    NOISE_TO_REACH,
     ON_CIRCLE,
     PLANTS,
     SOURCE,
@@ -25,6 +27,8 @@ from sitl.studies.paper.analysis.beyond import (
     circle_request,
     flown_laws,
     lengths,
+    noise_request,
+    noisy_lengths,
     plants,
     requests,
     step_request,
@@ -59,6 +63,7 @@ def section(context: Context) -> str:
         + _steps(context)
         + beyond_loop.table(ledger, LAWS)
         + _circles(context)
+        + _noise(context)
         + _cables(context)
     )
 
@@ -165,6 +170,26 @@ def _circles(context: Context) -> str:
     )
     return page.heading(f"V.C, the circle, from {ON_CIRCLE:g} s on") + page.table(
         ledger, ("law", "rms error in time [mm]", "rotors, rms [rad/s]"), rows
+    )
+
+
+def _noise(context: Context) -> str:
+    ledger = context.ledger
+    rows: list[tuple[str | Cell, ...]] = []
+    for length in noisy_lengths(context.quick):
+        for law in LAWS[2:]:
+            [flight] = context.pilot.fly([noise_request(law, length)])
+            errors = np.linalg.norm(flight.load - flight.reference, axis=1)[flight.time >= NOISE_FROM]
+            name, rms = f"beyond.noise.{length}.{law}", float(np.sqrt(np.mean(errors**2)))
+            if law == "geometric":
+                ledger.at_most(f"{name}.rms_m", rms, NOISE_TO_REACH[length], "m", SOURCE)
+            else:
+                ledger.put(f"{name}.rms_m", rms, "m", "softer weights: the linear law bears no stiffer ones")
+            rows.append(
+                (f"{law}, l₀ = {length} m: <code>{flight.command}</code>", Cell(f"{name}.rms_m", 1e3))
+            )
+    return page.heading("Held against 5 N of noise on the load") + page.table(
+        ledger, ("law", "rms error [mm]"), rows
     )
 
 

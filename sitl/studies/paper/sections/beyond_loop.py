@@ -26,7 +26,7 @@ def table(ledger: Ledger, laws: Sequence[str]) -> str:
             name, record = f"beyond.loop.{length}.{law}", design(law, vehicle, offline.RATE_HZ)
             model = actuated_model(vehicle)
             each = [delay_margin(model, record, inputs) for inputs in ((0,), (1,), (2,), (3,))]
-            source = "to first order `geometric` is `default`"
+            source = "20 ms are promised"
             if law in ("default", "geometric"):
                 ledger.at_least(f"{name}.margin_at_each_input_s", min(each), LEAST_MARGIN, "s", source)
             else:
