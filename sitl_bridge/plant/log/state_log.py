@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:  # the name of the file is needed before anything is launched
 FILE_NAME = "state.parquet"
 
 
-class RowTable:
+class RowTable(ABC):
     """Collects rows, and hands them over in chunks; see `plant.simulation.Recorder`."""
 
     def __init__(self, world: World) -> None:
@@ -47,9 +48,9 @@ class RowTable:
             self.keep(self.table[: self.count, self._keep])
             self.count = 0
 
+    @abstractmethod
     def keep(self, rows: Array) -> None:
         """Keep a chunk of rows (n, columns); nobody else has it."""
-        raise NotImplementedError
 
 
 class StateLog(RowTable):
