@@ -50,7 +50,7 @@ def test_setpoint_in_lockstep_and_what_it_leaves(fly: Fly) -> None:
 
 
 def test_the_same_seed_gives_the_same_log_whatever_is_lost(fly: Fly) -> None:
-    noisy = ("--set", "disturbance.force_std=5", "--duration", "6")
+    noisy = ("--set", "disturbance.force_std=5", "--duration", "6", "--no-report")
     once = fly("setpoint", *noisy, expect=1)  # too short to have settled
     again = fly("setpoint", *noisy, "--drop", "10", expect=1)
     other = fly("setpoint", *noisy, "--seed", "1", expect=1)

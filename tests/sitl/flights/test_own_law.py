@@ -49,9 +49,12 @@ def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+ONE_PROCESS = ("--in-process", "--no-report")
+
+
 def two_processes() -> tuple[str, ...]:
     [port] = free_ports(1)
-    return "--clock", "lockstep", "--hil", f"udpout:127.0.0.1:{port}"
+    return "--clock", "lockstep", "--hil", f"udpout:127.0.0.1:{port}", "--no-report"
 
 
 @pytest.mark.parametrize("vehicle", ["paper", "iris"])
@@ -90,7 +93,7 @@ def test_one_process_or_two_it_is_the_same_flight(feedback: str, tmp_path: Path)
         feedback,
     )
     common += ("--vehicle", "iris", "--set", "load.mass=0.2")
-    here = command(*common, "--in-process", "--out", str(tmp_path / "here"))
+    here = command(*common, *ONE_PROCESS, "--out", str(tmp_path / "here"))
     apart = command(*common, *two_processes(), "--out", str(tmp_path / "apart"))
     one, two = json.loads(here.stdout), json.loads(apart.stdout)
     assert one["completed"], here.stderr
@@ -113,7 +116,7 @@ def test_one_process_or_two_it_is_the_same_flight(feedback: str, tmp_path: Path)
 )
 def test_a_failing_law_is_one_message(body: str, says: tuple[str, ...], where: str, tmp_path: Path) -> None:
     law = law_file(tmp_path, body)
-    how = ("--in-process",) if where == "here" else two_processes()
+    how = ONE_PROCESS if where == "here" else two_processes()
     ended = command(
         "fly", "hover", "--law", law, "--duration", "2", "--json", "--out", str(tmp_path / "o"), *how
     )
@@ -129,7 +132,7 @@ def test_a_failing_law_is_one_message(body: str, says: tuple[str, ...], where: s
 
 def test_what_a_law_prints_does_not_get_into_the_way(tmp_path: Path) -> None:
     law = law_file(tmp_path, "import os; print('from Python'); os.write(1, b'from C\\n')")
-    for how in (("--in-process",), two_processes()):
+    for how in (ONE_PROCESS, two_processes()):
         ended = command(
             "fly", "hover", "--law", law, "--duration", "0.2", "--json", "--out", str(tmp_path), *how
         )
