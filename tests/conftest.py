@@ -1,6 +1,8 @@
 """Settings of every test."""
 
 import os
+import sys
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -17,6 +19,19 @@ settings.register_profile(
 )
 settings.register_profile("search", deadline=None, max_examples=1000, suppress_health_check=SLOW)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True)
+def _as_a_process_begins() -> Iterator[None]:
+    """A command that a test calls in this process does not decide for others where results and rows go."""
+    yield
+    for module, name, at_first in (
+        ("controller.design.kept", "_on_disk", False),
+        ("sitl_bridge.rowlog", "_apart", None),
+    ):
+        if module in sys.modules:
+            setattr(sys.modules[module], name, at_first)
+
 
 STATIONS = "tests/loopback/stations/"
 LONG = (

@@ -7,7 +7,6 @@ integral, past commands, estimated rotors), and an extra delay of any length spl
 from __future__ import annotations
 
 import numpy as np
-from scipy import linalg
 
 from controller.design.model import LinearModel
 from controller.law.control_law import STATE, Design
@@ -19,6 +18,9 @@ STRIDE = 2e-3
 
 def held_input(model: LinearModel, duration: float) -> tuple[Array, Array]:
     """(A, B) over `duration` seconds with the input held: x(t + duration) = A x + B u."""
+    # Here, because a flight whose gains are kept (`kept`) takes no scipy.
+    from scipy import linalg
+
     n, m = model.B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = model.A, model.B
