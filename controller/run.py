@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from controller.law.state import Array
     from controller.own_law.find import ChosenLaw
     from controller.own_law.pilot import OwnLawPilot
-    from controller.pilot.ground_options import GroundOptions
-    from controller.pilot.ground_session import Guided
+    from controller.pilot.guided.options import GroundOptions
+    from controller.pilot.guided.session import Guided
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
     logs = tuple(each for each in (log, terms_log) if each is not None)
     instance, say, rate = options.instance, speaker.say, options.rate_hz
     if options.path_from is None:
-        from controller.pilot.ground_session import Guided
+        from controller.pilot.guided.session import Guided
 
         guided = Guided(
             *(options.vehicle, rate, instance, _ground(options), say, assessor),
@@ -163,7 +163,7 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
 
 def _ground(options: ControllerOptions) -> GroundOptions:
     """With the flight's folder, whose logs clients may read."""
-    from controller.pilot.ground_options import GroundOptions
+    from controller.pilot.guided.options import GroundOptions
 
     return replace(options.ground or GroundOptions(), logs=options.out)
 

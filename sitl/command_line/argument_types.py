@@ -14,7 +14,7 @@ STACK_UDP_PORT, STACK_TCP_PORT = 14540, 5760
 """Where PX4 sends for a companion computer, and where ArduPilot's SITL listens."""
 
 if TYPE_CHECKING:
-    from controller.pilot.ground_options import Ports
+    from controller.pilot.guided.options import Ports
 
 
 def number(low: float, high: float, what: str) -> Callable[[str], float]:
@@ -81,7 +81,7 @@ def host_and_port(text: str) -> tuple[str, int]:
 
 def ports(text: str) -> Ports:
     """An argument type: LOCAL:PEER."""
-    from controller.pilot.ground_options import Ports
+    from controller.pilot.guided.options import Ports
 
     local, colon, peer = text.partition(":")
     numbers = [int(part) for part in (local, peer) if part.isdecimal() and 0 < int(part) < 65536]

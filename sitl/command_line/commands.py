@@ -28,7 +28,7 @@ from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 
 if TYPE_CHECKING:
-    from controller.pilot.ground_options import GroundOptions
+    from controller.pilot.guided.options import GroundOptions
     from sitl.flights.scenario import Scenario
     from sitl_bridge.mavlink.links.address import Address
     from sitl_bridge.plant.clocks.lockstep import OnSilence
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
-    from controller.pilot.ground_options import GroundOptions
+    from controller.pilot.guided.options import GroundOptions
 
     if arguments.signing_key is not None:
         from controller.ground.link.signing import KeyFileError, read_key

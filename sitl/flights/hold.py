@@ -17,7 +17,7 @@ from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 
 if TYPE_CHECKING:
-    from controller.pilot.ground_options import GroundOptions
+    from controller.pilot.guided.options import GroundOptions
 
 
 def ground_arguments(options: GroundOptions) -> list[str]:

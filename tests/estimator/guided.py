@@ -18,8 +18,8 @@ from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
 from controller.law.state import Array
-from controller.pilot.ground_piloted import GuidedAutopilot
-from controller.pilot.redesign import Redesigner
+from controller.pilot.guided.autopilot import GuidedAutopilot
+from controller.pilot.guided.redesign import Redesigner
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.faults.schedule import Faults
 from sitl_bridge.plant.log.notices import Notices

@@ -15,7 +15,7 @@ from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import profile_of
 from controller.hil.session import new_session
 from controller.law.control_law import Design
-from controller.pilot.ground_piloted import GuidedAutopilot
+from controller.pilot.guided.autopilot import GuidedAutopilot
 from sitl_bridge.plant.clocks.lockstep import Lockstep
 from sitl_bridge.plant.log.notices import Notices
 from sitl_bridge.plant.physics.state import LOAD_POSITION as PLANT_LOAD

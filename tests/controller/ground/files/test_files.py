@@ -23,7 +23,7 @@ from controller.ground.files.virtual import VirtualFiles
 from controller.ground.link.packing import ComponentInformation, ComponentMetadata
 from controller.ground.parameters.protocol import Parameters
 from controller.ground.parameters.table import TABLE
-from controller.pilot.log_folder import LogFolder
+from controller.pilot.guided.log_folder import LogFolder
 from tests.controller.ground.rig import Client, Rig
 
 CONTENT = random.Random(3).randbytes(50_000)

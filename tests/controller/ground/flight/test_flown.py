@@ -10,7 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.packing import frame
-from controller.pilot.redesign import WEIGHTS
+from controller.pilot.guided.redesign import WEIGHTS
 from sitl_bridge.mavlink.framing import Frame, split
 from tests.controller.ground.flown import RATE_HZ, Flown
 from tests.controller.ground.rig import NAN, Client

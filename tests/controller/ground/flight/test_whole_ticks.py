@@ -10,8 +10,8 @@ from pymavlink.dialects.v20.common import MAV_CMD_DO_GRIPPER as DO_GRIPPER
 
 from controller.ground.flight.client_requests import Reposition, reposition
 from controller.ground.flight.payload.gripper import RELEASE
-from controller.pilot.ground_piloted import GuidedAutopilot
-from controller.pilot.stages import AT_ONCE, NEVER, Stage, due, never_due
+from controller.pilot.guided.autopilot import GuidedAutopilot
+from controller.pilot.guided.stages import AT_ONCE, NEVER, Stage, due, never_due
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.ground.flown import Flown
 from tests.estimator.guided import GuidedFlight

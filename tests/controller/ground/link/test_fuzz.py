@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.packing import frame
-from controller.pilot.log_folder import LogFolder
+from controller.pilot.guided.log_folder import LogFolder
 from tests.controller.ground.rig import NAN, Channel, Rig
 
 SPICE = [NAN, float("inf"), float("-inf"), -1.0, 0.0, 1.0, 2.0, 21196.0, 1e38, 0.5]

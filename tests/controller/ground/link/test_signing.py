@@ -12,7 +12,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.signing import EPOCH, KeyFileError, Signing, read_key
-from controller.pilot.ground_link import GroundLink, GroundOptions, Ports
+from controller.pilot.guided.link import GroundLink, GroundOptions, Ports
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.ground.rig import Client, Rig
 

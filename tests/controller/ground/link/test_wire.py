@@ -61,7 +61,7 @@ def test_nothing_is_imported_for_the_first_frame_of_mavlink_1() -> None:
     """Imports take longer than the control loop has."""
     program = """
 import sys
-from controller.pilot.ground_link import GroundLink
+from controller.pilot.guided.link import GroundLink
 from controller.ground.link.packing import frame_v1
 before = set(sys.modules)
 assert frame_v1(bytes(9), 0, 50, 0, 1, 1)

@@ -14,7 +14,7 @@ from controller.ground.parameters.file import ParameterFile
 from controller.ground.parameters.parameter import Parameter
 from controller.ground.parameters.protocol import HASH_CHECK
 from controller.ground.parameters.table import BY_NAME, TABLE, markdown
-from controller.pilot.ground_link import GroundLink, GroundOptions, Ports
+from controller.pilot.guided.link import GroundLink, GroundOptions, Ports
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.controller.ground.rig import Channel, Client, Rig
 

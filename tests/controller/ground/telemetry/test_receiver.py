@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from controller.pilot.gps_display import SILENCE, Receiver
+from controller.pilot.guided.gps_display import SILENCE, Receiver
 from sitl_bridge.mavlink.hil import HIL_GPS
 from sitl_bridge.plant.sensors.instruments import LOST, OFF, WORKS
 from sitl_bridge.vehicle.files import load_vehicle

@@ -40,9 +40,9 @@ from controller.law.state import (
     VEHICLE_VELOCITY,
     Array,
 )
-from controller.pilot.late_gains import LateGains
-from controller.pilot.redesign import WEIGHTS, Redesigner
-from controller.pilot.stages import AT_ONCE, NEVER, Moment
+from controller.pilot.guided.late_gains import LateGains
+from controller.pilot.guided.redesign import WEIGHTS, Redesigner
+from controller.pilot.guided.stages import AT_ONCE, NEVER, Moment
 from sitl_bridge.frames import Triple
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.rotors import full_thrust

@@ -11,8 +11,8 @@ from controller.ground.link.sockets import GroundSockets
 from controller.ground.parameters.file import ParameterFile
 from controller.ground.station import ONBOARD_LINK, STATION_LINK, Station, local_ports, standard_peers
 from controller.ground.telemetry.vehicle_state import profile_of
-from controller.pilot.ground_options import GroundOptions, Ports
-from controller.pilot.log_folder import LogFolder
+from controller.pilot.guided.log_folder import LogFolder
+from controller.pilot.guided.options import GroundOptions, Ports
 from sitl_bridge.vehicle.description import Vehicle
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"

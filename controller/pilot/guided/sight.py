@@ -13,7 +13,7 @@ from controller.ground.station import Station
 from controller.ground.telemetry.vehicle_state import VehicleView
 from controller.hil.ticks import TickReader
 from controller.law.state import Array
-from controller.pilot.gps_display import Receiver
+from controller.pilot.guided.gps_display import Receiver
 from sitl_bridge.frames import CENTIAMPERES_PER_AMPERE, PERCENT, quaternion_from_euler
 from sitl_bridge.mavlink.fields import pack_voltage
 from sitl_bridge.mavlink.framing import Frame

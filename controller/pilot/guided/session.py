@@ -8,9 +8,9 @@ from collections.abc import Callable
 from controller.design.client import DesignProcess
 from controller.feedback.assessment import Assessor
 from controller.law.state import Array
-from controller.pilot.ground_link import GroundLink
-from controller.pilot.ground_options import GroundOptions
-from controller.pilot.ground_piloted import GuidedAutopilot
+from controller.pilot.guided.autopilot import GuidedAutopilot
+from controller.pilot.guided.link import GroundLink
+from controller.pilot.guided.options import GroundOptions
 from sitl_bridge.ids import COMPONENT_AUTOPILOT, vehicle_system
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.vehicle.description import Vehicle

@@ -28,11 +28,11 @@ from controller.hil.session import is_plant_heartbeat
 from controller.hil.ticks import TickReader, plant_seconds
 from controller.law.control_law import Law
 from controller.law.state import Array
-from controller.pilot.guided_laws import GuidedLaws
-from controller.pilot.guided_payload import PayloadWork
-from controller.pilot.redesign import Redesigner
-from controller.pilot.sight import Sight
-from controller.pilot.stages import AT_ONCE, NEVER, Moment, Stage, due, never_due, run
+from controller.pilot.guided.laws import GuidedLaws
+from controller.pilot.guided.payload import PayloadWork
+from controller.pilot.guided.redesign import Redesigner
+from controller.pilot.guided.sight import Sight
+from controller.pilot.guided.stages import AT_ONCE, NEVER, Moment, Stage, due, never_due, run
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle.description import Vehicle
 

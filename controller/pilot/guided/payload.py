@@ -10,8 +10,8 @@ from controller.ground.flight.payload.winch import Report
 from controller.ground.link.packing import decoded
 from controller.ground.station import Station
 from controller.law.state import Array
-from controller.pilot.guided_laws import GuidedLaws
-from controller.pilot.stages import AT_ONCE, NEVER, Moment
+from controller.pilot.guided.laws import GuidedLaws
+from controller.pilot.guided.stages import AT_ONCE, NEVER, Moment
 from sitl_bridge.ids import CLUTCH_CONTROL, GRIPPER_CONTROL, WINCH_CONTROL
 from sitl_bridge.mavlink.framing import Frame
 
