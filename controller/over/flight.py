@@ -249,7 +249,7 @@ class Flight:
         self.state, self.since, self.next_try, self.missing = state, now, now, ""
 
     def fail(self, why: str, now: float) -> None:
-        """It is over, and nothing is sent any more."""
+        """It is over, and nothing more is sent."""
         self.failure = why
         self.say(why)
         self.go(State.FAILED, now)

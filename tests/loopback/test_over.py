@@ -69,7 +69,7 @@ def test_a_companion_on_a_serial_line_arms_the_stack(start: Start, tmp_path: Pat
         companion.popen.send_signal(signal.SIGTERM)
         code, _, errors = companion.finish()
         assert code == 1
-        assert "stopped by SIGTERM: nothing is sent any more" in errors
+        assert "stopped by SIGTERM: nothing more is sent" in errors
     finally:
         line.close()
 

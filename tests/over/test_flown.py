@@ -62,7 +62,7 @@ def test_a_silent_companion_is_replaced_and_an_operator_is_obeyed() -> None:
     over.stack.wait(0.5)
     assert second.state is State.FAILED
     assert over.stack.machine.mode.name == "HOLD"
-    assert "took another mode: nothing is sent any more" in over.said[-1]
+    assert "took another mode: nothing more is sent" in over.said[-1]
     third = over.start(hover, 60.0)
     over.run_until(lambda: third.state is State.FLYING, 30.0, "the third flies")
     companion, now = over.companion, over.stack.now  # the stack stands still, and the world with it
@@ -72,7 +72,7 @@ def test_a_silent_companion_is_replaced_and_an_operator_is_obeyed() -> None:
         assert third.state is State.FLYING  # a busy machine
     companion.to_send(now + LONGEST_STANDSTILL + 0.02)
     assert third.state is State.FAILED
-    assert "state is older than 0.2 s: nothing is sent any more" in over.said[-1]
+    assert "state is older than 0.2 s: nothing more is sent" in over.said[-1]
 
 
 def test_identify_finds_the_rotors_lag_and_thrust(

@@ -149,7 +149,7 @@ def take_off(flight: Flight, now: float) -> None:
     above_home = t.altitude_msl - t.home_altitude
     if flight.due(now):
         if not t.armed:
-            flight.fail("the stack disarmed before it took off: nothing is sent any more", now)
+            flight.fail("the stack disarmed before it took off: nothing more is sent", now)
             return
         if above_home < OFF_THE_GROUND:
             altitude = height if flight.dialect.relative_takeoff else t.home_altitude + height

@@ -35,7 +35,7 @@ STILL_TIME = 0.5
 LONGEST_STEADYING = 8.0
 """s, after which the reference begins in any case."""
 NO_MORE = "nothing more is sent; the stack's own failsafe holds"
-OTHER_MODE = "the operator, or a failsafe, took another mode: nothing is sent any more"
+OTHER_MODE = "the operator, or a failsafe, took another mode: nothing more is sent"
 
 
 def stream(flight: Flight, now: float) -> None:
