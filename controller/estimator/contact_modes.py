@@ -69,6 +69,10 @@ DOUBTED_SPEED = 0.5
 """m/s, likewise"""
 USUAL_SWING = 0.12
 """rad, of a load's swing when what held the vehicle has let go of it. A slack cable does not swing."""
+FIRST_FORCE = 3.0
+"""Of what an unmodelled force usually is: what it may be as the vehicle takes off, for then a wind may blow.
+
+Where less was expected, a sudden 12 m/s was taken for a swing of the load: `heavy` leaned by 64°, not 44."""
 STRETCH_STD = 0.02
 """Of the cable's length: how well a pull shows how long the cable is."""
 
@@ -243,7 +247,7 @@ def leave_ground(f: Filter) -> None:
     f.m.vehicle_mode = FLYING
     f.m.grounded = False
     f.m.contact_time = 0.0
-    set_part(f, FORCE, 3, f.p.force_std)
+    set_part(f, FORCE, 3, FIRST_FORCE * f.p.force_std)
     if f.m.load_mode in (LOAD_ON_GROUND, LOAD_DROPPED):
         return
     for part in (LOAD, LOAD_VELOCITY):
