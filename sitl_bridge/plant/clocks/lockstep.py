@@ -172,11 +172,13 @@ class Lockstep:
             self._notices.over("silence", "autopilot answers again")
         if self._on_silence == "continue":
             self._last_controls = answer.controls.copy()
-        if answer.armed and not self.simulation.started:
+        begins = answer.armed and not self.simulation.started
+        if begins:
             self.simulation.begin()
-            self._timer = RetransmissionTimer()  # what came before was start-up
         self._advance(answer.controls)
         self._answered(now)
+        if begins:  # what came before was start-up, and this tick was planned in
+            self._timer = RetransmissionTimer()
 
     def _freewheel(self, now: float) -> None:
         """Until the first answer: time runs at the nominal pace, the vehicle is held."""

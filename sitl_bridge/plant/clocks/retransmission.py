@@ -1,5 +1,8 @@
 """How long to wait for an answer before a tick is sent again: RFC 6298's smoothed round trip, times ten.
 
+A sample counts for no more than twice the smoothed round trip: a stall of the machine is no round trip, and
+with a time-out of ten each loss behind it would cost ten of them.
+
 The RFC's own time-out, the smoothed round trip and four variations, is always shorter: from its first sample
 on, the variation never exceeds twice the smoothed round trip. So it is not kept.
 
@@ -21,6 +24,8 @@ LONGEST_TIMEOUT = 0.5
 """s"""
 ROUND_TRIPS = 10.0
 """Smoothed round trips in a time-out: the processes share their cores with others."""
+LARGEST_SAMPLE = 2.0
+"""Of the smoothed round trip, for which a sample counts at most"""
 _MOST_DOUBLINGS = 16
 
 
@@ -44,7 +49,8 @@ class RetransmissionTimer:
         if self._smoothed is None:
             self._smoothed = round_trip
         else:
-            self._smoothed += 0.125 * (round_trip - self._smoothed)
+            most = LARGEST_SAMPLE * self._smoothed
+            self._smoothed += 0.125 * (min(round_trip, most) - self._smoothed)
 
     def expired(self) -> None:
         """No answer came in time."""

@@ -147,7 +147,7 @@ def test_a_tick_without_an_answer_is_sent_again_each_time_after_twice_the_time()
     for _ in range(4):
         waits.append(c.wait)
         assert c.send_when_due() == [b"tick 2"]
-    first = 10 * 0.001  # ten round trips
+    first = FIRST_TIMEOUT
     assert waits == pytest.approx([first, 2 * first, 4 * first, 8 * first])
     assert c.clock.resent_ticks == 4
     assert c.simulation.done == []
@@ -174,18 +174,20 @@ def test_the_round_trip_is_never_estimated_from_a_repeated_tick() -> None:
 
 def test_a_second_answer_to_a_repeated_tick_doubles_the_time_until_there_is_a_sample() -> None:
     c = Clock().in_flight()
+    c.answer(2, after=0.001)
+    c.send()
     before = c.wait
     c.send_when_due()
-    c.answer(2)
-    c.answer(2)  # before the next tick is sent, and a third answer says nothing more
-    c.answer(2)
+    c.answer(3)
+    c.answer(3)  # before the next tick is sent, and a third answer says nothing more
+    c.answer(3)
     c.send()
     assert c.wait == pytest.approx(2 * before)
-    c.answer(3, after=0.001)
+    c.answer(4, after=0.001)
     c.send()
     assert c.wait == pytest.approx(before)
-    c.answer(3)  # of a tick that was sent once: the link's own doing
-    c.answer(4, after=0.001)
+    c.answer(4)  # of a tick that was sent once: the link's own doing
+    c.answer(5, after=0.001)
     c.send()
     assert c.wait == pytest.approx(before)
 
@@ -218,7 +220,10 @@ def test_what_came_before_the_scenario_does_not_count_for_the_round_trip() -> No
         c.send()
         c.answer(tick, armed=False, after=0.004)
     c.send()
-    c.answer(5, after=0.001)
+    c.answer(5, after=0.003)  # the way was planned
+    c.send()
+    assert c.wait == pytest.approx(FIRST_TIMEOUT)
+    c.answer(6, after=0.001)
     c.send()
     assert c.wait == pytest.approx(10 * 0.001)
 

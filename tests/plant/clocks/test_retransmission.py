@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from sitl_bridge.plant.clocks.retransmission import (
     FIRST_TIMEOUT,
+    LARGEST_SAMPLE,
     LONGEST_TIMEOUT,
     ROUND_TRIPS,
     RetransmissionTimer,
@@ -31,12 +32,21 @@ def test_the_timeout_is_ten_smoothed_round_trips_and_no_shorter_than_the_rfcs(
     timer = RetransmissionTimer()
     smoothed, variation = round_trips[0], round_trips[0] / 2
     timer.sample(round_trips[0])
-    for sample in round_trips[1:]:
+    for round_trip in round_trips[1:]:
+        sample = min(round_trip, LARGEST_SAMPLE * smoothed)
         variation = 0.75 * variation + 0.25 * abs(smoothed - sample)
         smoothed = 0.875 * smoothed + 0.125 * sample
-        timer.sample(sample)
+        timer.sample(round_trip)
     assert timer.timeout() == pytest.approx(min(LONGEST_TIMEOUT, ROUND_TRIPS * smoothed))
     assert ROUND_TRIPS * smoothed >= smoothed + 4 * variation
+
+
+def test_a_stall_makes_the_timeout_an_eighth_longer_at_most() -> None:
+    timer = RetransmissionTimer()
+    timer.sample(1e-4)
+    before = timer.timeout()
+    timer.sample(0.5)
+    assert timer.timeout() == pytest.approx(9 / 8 * before)
 
 
 def test_the_timeout_doubles_with_each_repeat_of_a_tick_and_is_the_plain_one_for_the_next() -> None:
