@@ -15,6 +15,9 @@ _BESIDE = 0.6
 """Largest distance from the load at which the vehicle lands, as a share of the cable's length."""
 _NEAR = 0.2
 """m"""
+_OF_REACH = 0.25
+"""How near the vehicle comes to its place beside the load before it goes down, as a share of the way there: a
+winch may have left it no more than decimetres of cable."""
 _SLOW = 0.4
 """m/s"""
 
@@ -74,7 +77,9 @@ class Descent:
         elif self.step is Step.ABOVE and self._arrived(view.load_position, view.load_velocity):
             self.step = Step.LOAD_DOWN
             self._target = Land(Body.LOAD, self._place, self._yaw, self._speed)
-        elif self.step is Step.BESIDE and self._arrived(view.position, view.velocity):
+        elif self.step is Step.BESIDE and self._arrived(
+            view.position, view.velocity, _OF_REACH * self._reach
+        ):
             self._go_down(self._target.position)
         elif self.step is Step.VEHICLE_DOWN and view.vehicle_on_ground:
             self.step = Step.DONE
@@ -99,5 +104,6 @@ class Descent:
         self.step = Step.VEHICLE_DOWN
         self._target = Land(Body.VEHICLE, position, self._yaw, self._speed)
 
-    def _arrived(self, position: Triple, velocity: Triple) -> bool:
-        return math.dist(position, self._target.position) < _NEAR and math.hypot(*velocity) < _SLOW
+    def _arrived(self, position: Triple, velocity: Triple, near: float = _NEAR) -> bool:
+        away = math.dist(position, self._target.position)
+        return away < min(near, _NEAR) and math.hypot(*velocity) < _SLOW
