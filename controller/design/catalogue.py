@@ -73,8 +73,8 @@ STIFFEST = Emphasis(
     moments=0.1,
 )
 """The stiffest law that is of use; between it and `EVEN` factors go geometrically."""
-MOST_STIFF = 0.92
-"""Of the nonlinear law. The linear one, made stiffer, loses V.B with another load and cable."""
+MOST_STIFF = 0.25
+"""Of the nonlinear law: stiffer ones (0.5 and more) lose the load when they begin with it swinging widely."""
 
 
 def default_weights(vehicle: Vehicle, emphasis: Emphasis = EVEN, loaded: bool = True) -> Weights:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from controller.design.catalogue import (
     EVEN,
@@ -45,13 +44,8 @@ def test_factors_go_from_even_to_the_stiffest() -> None:
     np.testing.assert_allclose(times(half, half), STIFFEST)
 
 
-@pytest.mark.parametrize(
-    ("name", "told", "rate_hz"), [("tiny, heavy load", 2, 50.0), ("small", 0, 50.0), ("small, lag", 0, RATE)]
-)
-def test_what_is_chosen_keeps_margin_and_rotors_and_little_more_would_not(
-    name: str, told: int, rate_hz: float
-) -> None:
-    vehicle = delayed(FLEET[name], told)
+def test_what_is_chosen_keeps_margin_and_rotors_and_little_more_would_not() -> None:
+    vehicle, rate_hz = delayed(FLEET["tiny, heavy load"], 2), 50.0
     model, chosen = actuated_model(vehicle), stiffness(vehicle, rate_hz)
 
     def kept(share: float) -> bool:
@@ -61,6 +55,11 @@ def test_what_is_chosen_keeps_margin_and_rotors_and_little_more_would_not(
     assert 0.0 < chosen < MOST_STIFF
     assert kept(chosen)
     assert not kept(chosen + 0.0625)
+
+
+def test_slow_rotors_on_a_long_cable_get_no_stiffer_law() -> None:
+    assert stiffness(FLEET["large, lag"], RATE) == 0.0
+    assert stiffness(FLEET["large"], RATE) == MOST_STIFF
 
 
 def test_what_bears_a_delay_has_that_margin() -> None:
