@@ -77,9 +77,7 @@ class Descent:
         elif self.step is Step.ABOVE and self._arrived(view.load_position, view.load_velocity):
             self.step = Step.LOAD_DOWN
             self._target = Land(Body.LOAD, self._place, self._yaw, self._speed)
-        elif self.step is Step.BESIDE and self._arrived(
-            view.position, view.velocity, _OF_REACH * self._reach
-        ):
+        elif self.step is Step.BESIDE and self._is_beside(view):
             self._go_down(self._target.position)
         elif self.step is Step.VEHICLE_DOWN and view.vehicle_on_ground:
             self.step = Step.DONE
@@ -104,6 +102,9 @@ class Descent:
         self.step = Step.VEHICLE_DOWN
         self._target = Land(Body.VEHICLE, position, self._yaw, self._speed)
 
+    def _is_beside(self, view: VehicleView) -> bool:
+        return self._arrived(view.position, view.velocity, min(_NEAR, _OF_REACH * self._reach))
+
     def _arrived(self, position: Triple, velocity: Triple, near: float = _NEAR) -> bool:
         away = math.dist(position, self._target.position)
-        return away < min(near, _NEAR) and math.hypot(*velocity) < _SLOW
+        return away < near and math.hypot(*velocity) < _SLOW
