@@ -12,6 +12,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
+from sitl_bridge.event_log import read_events
 from tests.loopback.conftest import Process, alive, children, wait_until
 
 Start = Callable[..., Process]
@@ -144,7 +145,7 @@ def test_a_folder_used_again_tells_nothing_of_the_flight_before(
     assert "state.parquet" in listed
     flight = start(*line, "--hil", f"udpout:127.0.0.1:{port}")
     wait_until(lambda: len(children(flight.popen.pid)) == 2, "no plant and controller")
-    for pid in children(flight.popen.pid):  # they have only just been launched, and written nothing
+    for pid in children(flight.popen.pid):  # they have only just been launched, and said a word at most
         os.kill(pid, signal.SIGKILL)
     code, output, errors = flight.finish()
     assert code == 1
@@ -153,7 +154,8 @@ def test_a_folder_used_again_tells_nothing_of_the_flight_before(
     assert not summary["settled"]
     assert summary.get("steady_state_error_m") is None
     assert output.split()[-1] == str(tmp_path / "summary.json")
-    assert {file.name for file in tmp_path.iterdir()} == {"notes.txt", "summary.json"}
+    assert {file.name for file in tmp_path.iterdir()} - {"events.jsonl"} == {"notes.txt", "summary.json"}
+    assert not any(event.time_s for event in read_events(tmp_path))
 
 
 def test_a_killed_supervisor_leaves_nothing_running(start: Start, port: int, tmp_path: Path) -> None:
