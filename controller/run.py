@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from controller.own_law.pilot import OwnLawPilot
     from controller.pilot.guided.options import GroundOptions
     from controller.pilot.guided.session import Guided
+    from controller.pilot.legs import Legs
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class Session(NamedTuple):
     guided: Guided | None
     """What ground control needs of it."""
     own_law: OwnLawPilot | None
+    legs: Legs | None
+    """Of the reference; None under ground control."""
 
     def close_logs(self) -> None:
         """Write out everything; raises what went wrong while writing."""
@@ -108,6 +111,7 @@ def run(options: ControllerOptions, speaker: Speaker, stop: StopRequest) -> dict
         "stopped_by": stop.reason,
         "control_steps": session.hil.steps,
         "law": None if own_law is None else own_law.cost,
+        "legs_began_s": [] if session.legs is None else session.legs.began_s,
         "failure": None if failure is None else str(failure),
     }
     speaker.event("end", **outcome)
@@ -143,22 +147,31 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
             on_statustext=lambda text: speaker.note("statustext", text),
         )
         hil = new_session(guided.autopilot, instance, say, feedback, rate, terms_log)
-        return Session(hil, logs, guided, None)
+        return Session(hil, logs, guided, None, None)
     path_from = options.path_from if feedback is None else feedback.path_from(options.path_from)
 
     own_law: OwnLawPilot | None = None
+    legs: Legs | None = None
+
+    def on_leg(number: int, count: int, began_s: float) -> None:
+        speaker.event("leg", number=number, began_s=began_s)
+        if number > 1:
+            speaker.note("mode", f"to point {number} of {count}")
 
     def autopilot(controls: Array) -> Pilot:
-        nonlocal own_law
+        nonlocal own_law, legs
         if options.law is None:
-            return Autopilot(options.vehicle, design, rate, path_from, controls)
+            pilot = Autopilot(options.vehicle, design, rate, path_from, controls, on_leg)
+            legs = pilot.legs
+            return pilot
         from controller.own_law.pilot import OwnLawPilot
 
-        own_law = OwnLawPilot(options.law, options.vehicle, rate, path_from, controls)
+        own_law = OwnLawPilot(options.law, options.vehicle, rate, path_from, controls, on_leg)
+        legs = own_law.legs
         return own_law
 
     hil = new_session(autopilot, instance, say, feedback, rate, terms_log)
-    return Session(hil, logs, None, own_law)
+    return Session(hil, logs, None, own_law, legs)
 
 
 def _ground(options: ControllerOptions) -> GroundOptions:

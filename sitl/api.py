@@ -29,8 +29,9 @@ from sitl.flights.scenario import (
 )
 from sitl.flights.suited_reference import scenario_for
 from sitl.json_values import to_json
-from sitl.report.metrics import flight_metrics, reference_positions
+from sitl.report.metrics import reference_positions
 from sitl.report.outcome import judge
+from sitl.report.points import as_flown, path_metrics
 from sitl.report.sensing_error import sensing_error
 from sitl.report.summary import PROMISED, clear, draw, read_state_log, write_report, write_summary
 from sitl_bridge.log_amount import Logs
@@ -143,7 +144,7 @@ def fly(
     )
     if ended.law_failure is not None:
         raise ended.law_failure
-    path = described.reference.path(told.initial_load_position)
+    path = as_flown(described.reference.path(told.initial_load_position), ended.legs_began_s)
     facts = {
         "scenario": scenario if isinstance(scenario, str) else described.description,
         "vehicle": told.name,
@@ -200,7 +201,7 @@ def _summary(
         load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
         reference = reference_positions(path, states["time_s"])
         seen = sensing_error(told, facts["feedback"], facts["rate_hz"])
-        summary |= flight_metrics(states["time_s"], load, reference, seen)
+        summary |= path_metrics(path, states["time_s"], load, seen)
         summary["settled"] = bool(summary["settled"] and facts["completed"])
         summary |= judge(states, reference, told, summary)._asdict()
     return {key: to_json(value) for key, value in summary.items()}

@@ -31,12 +31,13 @@ def vehicle_faults(vehicle: Vehicle) -> list[str]:
     return [*_thrust(vehicle), *_rotors_too_slow(vehicle)]
 
 
-def path_faults(path: Path, vehicle: Vehicle, feasible: bool = True) -> list[str]:
+def path_faults(path: Path, vehicle: Vehicle, feasible: bool = True, key: str = "position") -> list[str]:
     """Why the vehicle cannot fly this path (1,); empty: there is no reason.
 
     feasible: the design follows a feasible motion. Otherwise the path is only held against the ground.
+    key: of a set-point in its reference.
     """
-    faults = _below_ground(path, vehicle)
+    faults = _below_ground(path, vehicle, key)
     if feasible and float(path["radius"][0]) > 0.0:
         faults += _circle(path, vehicle)
     return faults
@@ -102,15 +103,15 @@ def _hovering(vehicle: Vehicle) -> list[tuple[float, Rotor]]:
     return list(zip(hover_rotor_speeds(vehicle), vehicle.rotors, strict=True))
 
 
-def _below_ground(path: Path, vehicle: Vehicle) -> list[str]:
+def _below_ground(path: Path, vehicle: Vehicle, key: str) -> list[str]:
     if vehicle.ground is None:
         return []
     lowest, height = vehicle.ground.height + vehicle.load.radius, float(path["centre"][0][2])
     if height >= lowest - vehicle.ground.sink:
         return []
-    key = "centre.2" if float(path["radius"][0]) > 0.0 else "position.2"
+    key = "centre" if float(path["radius"][0]) > 0.0 else key
     return [
-        f"reference.{key} = {height:g} m: the load would be in the ground; expected {lowest:g} m or more, "
+        f"reference.{key}.2 = {height:g} m: the load would be in the ground; expected {lowest:g} m or more, "
         f"ground.height with load.radius"
     ]
 

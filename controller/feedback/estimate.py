@@ -221,8 +221,8 @@ class EstimateFeedback:
             if self.estimator.in_flight:
                 return path_from(load)
             path = path_from(start)
-            path["unhurried"] = np.array_equal(path["centre"], path["start"])
-            path["start"] = load
+            path["unhurried"][0] = np.array_equal(path["centre"][0], path["start"][0])
+            path["start"][0] = load
             return path
 
         return make

@@ -1,6 +1,7 @@
 """Where the load is to be: set-points and circles as smooth motions with all their derivatives.
 
-A path is one flat record, so that compiled code evaluates it at every tick. `raw` gives the position that
+A path is one flat record, so that compiled code evaluates it at every tick. A sequence of set-points is an
+array of them, one for each leg, of which a law has one at a time. `raw` gives the position that
 the paper feeds to its integrator, steps and all; `feasible` leaves the start smoothly, so that a feed-forward
 can follow it exactly. How it leaves is a smooth step, or a profile that was planned for the vehicle
 (`design.motion`). A path can also be given moment by moment (`local_path`), by somebody who shapes it as the
@@ -10,6 +11,7 @@ flight goes on.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,8 @@ PATH = np.dtype(
         ("yaw_rate", "f8"),  # rad/s
         ("agility", "f8"),  # 0, gentle, to 1, all there is: how fast a planned profile is to be
         ("unhurried", "i8"),  # 1: it is left by a smooth step, not by the fastest motion
+        ("begin", "f8"),  # s, when a leg of a sequence begins; inf: it has not begun
+        ("hold", "f8"),  # s, that it goes on after its ramp
         ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw
         ("epoch", "f8"),  # s, path time of `motion`
         ("motion", "f8", (DERIVATIVES + 1, 3)),  # position and derivatives at that time
@@ -93,6 +97,17 @@ PEAK_ACCELERATION = _peak(2)
 def setpoint(position: tuple[float, float, float], start: tuple[float, float, float]) -> Path:
     """A path that goes to `position` (m, world) and stays; `start` is where the load is now."""
     return circle(position, 0.0, 0.0, start)
+
+
+def points(
+    positions: Sequence[tuple[float, float, float]], hold: float, start: tuple[float, float, float]
+) -> Path:
+    """Paths (n,) from point to point (m, world), each held for some s; `start` is where the load is now."""
+    starts = (start, *positions[:-1])
+    legs = [setpoint(position, before) for position, before in zip(positions, starts, strict=True)]
+    path = np.concatenate(legs)
+    path["hold"], path["begin"][1:] = hold, math.inf
+    return path
 
 
 def circle(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from controller.own_law.find import ChosenLaw, make
 from controller.own_law.interface import Estimate, LawError, OwnLaw, Reference
 from controller.own_law.tick import MOTION_ROWS, allocate_wrench, reference_at
 from controller.pilot.autopilot import planned_from
+from controller.pilot.legs import Legs, OnLeg, no_legs, planned_legs
 from sitl_bridge.mavlink.framing import Frame
 from sitl_bridge.vehicle.description import Cable, Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
@@ -47,7 +47,13 @@ class OwnLawPilot:
     """There is no compiled law: `step` is called at each tick."""
 
     def __init__(
-        self, chosen: ChosenLaw, vehicle: Vehicle, rate_hz: float, path_from: PathFrom, controls: Array
+        self,
+        chosen: ChosenLaw,
+        vehicle: Vehicle,
+        rate_hz: float,
+        path_from: PathFrom,
+        controls: Array,
+        on_leg: OnLeg = no_legs,
     ) -> None:
         """Raises DescriptionError for a law that cannot be flown."""
         self.armed = False
@@ -60,7 +66,9 @@ class OwnLawPilot:
         self._rotors = len(vehicle.rotors)
         self._flying: OwnLaw = make(chosen, vehicle, rate_hz)
         self._path: Path | None = None
-        self._ticks = 0
+        self._ticks = self._leg_ticks = 0
+        following = path_from(vehicle.initial_load_position)[1:]
+        self.legs = Legs(planned_legs(following, self._plan), rate_hz, on_leg)
         self._motion, self._raw = np.zeros((2, MOTION_ROWS, 3))
         self._scratch = np.zeros(MOTION_ROWS)
         self._wrench = np.zeros(WRENCH_SIZE)
@@ -108,15 +116,18 @@ class OwnLawPilot:
         if self.failure is not None:
             return
         if self._path is None:
-            self._path = planned_from(
-                self._path_from, estimate, partial(smoothly_planned, vehicle=self._vehicle)
-            )
-            self._ticks = 0
+            self._path = planned_from(self._path_from, estimate, self._plan)
+            self._ticks = self._leg_ticks = 0
             self._reference_at = reference_at.bind(self._path, self._motion, self._raw, self._scratch)
+            self.legs.begin(time_usec)
+        if self.legs.is_over(self._path, self._leg_ticks):
+            self._path[:] = self.legs.next(time_usec)
+            self._leg_ticks = 0
         time_s = self._ticks / self._rate_hz
-        self._ticks += 1
         seen = estimate_of(estimate, time_s, self._vehicle.cable)
-        wanted = self._reference(self._path, time_s)
+        wanted = self._reference(self._path, time_s, self._leg_ticks / self._rate_hz)
+        self._ticks += 1
+        self._leg_ticks += 1
         began = time.perf_counter_ns()
         try:
             returned = self._flying.step(seen, wanted)
@@ -154,8 +165,11 @@ class OwnLawPilot:
         self.terms = terms.reshape(-1)
         return wrong
 
-    def _reference(self, path: Path, time_s: float) -> Reference:
-        self._reference_at(time_s)
+    def _plan(self, path: Path) -> Path:
+        return smoothly_planned(path, self._vehicle)
+
+    def _reference(self, path: Path, time_s: float, leg_time_s: float) -> Reference:
+        self._reference_at(leg_time_s)
         position, velocity, acceleration, jerk, snap, _ = self._motion.copy()
         yaw, yaw_rate = float(path["yaw"][0]), float(path["yaw_rate"][0])
         goal = self._raw[0].copy()

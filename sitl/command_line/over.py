@@ -73,6 +73,18 @@ def over_options(
     )
 
 
+def _check_reference(scenario: Scenario | None) -> None:
+    """Raises DescriptionError for a reference that is not flown over a stack."""
+    if scenario is not None and scenario.reference.kind == "points":
+        raise DescriptionError(
+            "--over",
+            [
+                "a sequence of points is not flown over a stack; expected one set-point, or the scenario "
+                "hold and points sent to it live"
+            ],
+        )
+
+
 def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario | None) -> int:
     """Fly one reference over a stack; exit code 1 when it did not come to its end."""
     from controller.over.run import run
@@ -80,6 +92,7 @@ def run_over(arguments: argparse.Namespace, vehicle: Vehicle, scenario: Scenario
     from sitl.flights.scenario import GroundControl, Hover
 
     reference = scenario.reference if scenario else Hover(kind="hover")
+    _check_reference(scenario)
     if scenario is not None:
         check_feasible(scenario, vehicle, "default")
     duration = arguments.duration or (scenario.duration if scenario else None) or DEFAULT_DURATION
@@ -135,6 +148,7 @@ def fly_over_stack(
         if getattr(arguments, name) != USUAL.get(name):
             raise DescriptionError(f"--{name.replace('_', '-')}", [f"does not go with --over: {why}"])
     scenario = scenario_for(arguments.scenario, arguments.vehicle, overrides).scenario  # `fly` has told
+    _check_reference(scenario)
     live = _live_ports(arguments) if isinstance(scenario.reference, GroundControl) else None
     if live is None and arguments.gcs is not None:
         raise DescriptionError("--gcs", ["goes with a scenario that leaves the load to it, such as hold"])

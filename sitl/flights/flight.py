@@ -25,6 +25,7 @@ from sitl.flights.scenario import (
     usual_feedback,
 )
 from sitl.report.keep import keep_recording
+from sitl.report.points import as_flown
 from sitl.report.summary import OF_THE_PLANT, clear, without_files, write_report, write_summary
 from sitl.terminal.display import Display
 from sitl.terminal.status import Status, status_of
@@ -214,6 +215,7 @@ def _fly_here(
         failure=of_law or stopped or given_up,
         first_command_unix_s=ended.began_at,
         law=ended.law,
+        legs_began_s=ended.legs_began_s,
     )
 
 
@@ -257,7 +259,8 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
         if not reference:
             reference.append(path_from(start))
         load = np.array(event["load_m"])
-        target = reference_positions(reference[0], np.array([event["time_s"]]))[0]
+        began = event.pop("legs_began_s", [])
+        target = reference_positions(as_flown(reference[0], began), np.array([event["time_s"]]))[0]
         event["mode"] = scenario.reference.kind
         return status_of(event, float(np.linalg.norm(load - target)))
 
@@ -271,7 +274,7 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
     if outcome.failure:
         print(f"fly: {outcome.failure}", file=sys.stderr, flush=True)
     facts = flight_facts(options, vehicle, outcome)
-    path = path_from(start)
+    path = as_flown(path_from(start), outcome.legs_began_s)
     estimating = vehicle if estimates(facts["feedback"], vehicle) else None
     kept = options.logs != "none"
     summary = write_report(out, facts, path, estimating, vehicle, picture=kept and options.report)

@@ -83,6 +83,8 @@ class Ended:
     """What plant and controller had to say."""
     law: dict[str, Any] | None = None
     """Name and cost of the user's own law, see `OwnLawPilot.cost`."""
+    legs_began_s: list[float] = field(default_factory=list)
+    """When each leg of the reference began, s; see `pilot.legs`."""
     law_failure: LawError | None = None
     """Why it could not go on."""
 
@@ -147,7 +149,7 @@ def fly_in_process(
         controller.keep(diary, lambda: session.hil.scenario_time)
     failure = None
     try:
-        _loop(clock, session, tlog, stop, lambda: show(_progress(simulation, began)))
+        _loop(clock, session, tlog, stop, lambda: show(_progress(simulation, began, session)))
     except Diverged as error:
         failure = str(error)
     finally:
@@ -158,6 +160,7 @@ def fly_in_process(
             recorder.close()
     ended = Ended(_account(flight, simulation, began, stop, failure), said=said)
     ended.began_at = began[1] if began else None
+    ended.legs_began_s = _legs_began(session)
     if session.own_law is not None:
         ended.law, ended.law_failure = session.own_law.cost, session.own_law.failure
     if isinstance(recorder, MemoryLog):
@@ -229,8 +232,13 @@ def _controller_options(flight: InProcessFlight) -> ControllerOptions:
     )
 
 
-def _progress(simulation: Simulation, began: list[float]) -> dict[str, Any]:
-    return {**progress_of(simulation), "real_time_factor": _factor(simulation, began)}
+def _progress(simulation: Simulation, began: list[float], session: Session) -> dict[str, Any]:
+    more = {"real_time_factor": _factor(simulation, began), "legs_began_s": _legs_began(session)}
+    return {**progress_of(simulation), **more}
+
+
+def _legs_began(session: Session) -> list[float]:
+    return [] if session.legs is None else session.legs.began_s
 
 
 def _factor(simulation: Simulation, began: list[float]) -> float | None:

@@ -37,6 +37,8 @@ class Outcome:
     launch_to_first_command_s: float | None = None
     law: dict[str, Any] | None = None
     """Name and cost of the user's own law, see `OwnLawPilot.cost`."""
+    legs_began_s: list[float] = field(default_factory=list)
+    """When each leg of the reference began, s since the law took over; see `pilot.legs`."""
     mode: str | None = None
     """The last one that the controller told of, under ground control."""
 
@@ -104,8 +106,8 @@ def how_it_ended(child: Child) -> str:
 def watch(pair: Pair, stop: StopRequest, show: Callable[[dict[str, Any]], None]) -> Outcome:
     """Wait for the flight's end, for a process to end before its time, or for a request to stop.
 
-    show(event): called with each progress event of the plant, which has the controller's `mode` too. Both
-    processes are gone on return.
+    show(event): called with each progress event of the plant, which has the controller's `mode` and
+    `legs_began_s`, too. Both processes are gone on return.
     """
     outcome = Outcome()
     events = {name: _Events(child) for name, child in pair.processes.items()}
@@ -172,9 +174,12 @@ def _take(
         outcome.first_command_unix_s = event["unix_time_s"]
         outcome.launch_to_first_command_s = event["unix_time_s"] - pair.launched_at
     elif kind == "progress":
-        show({**event, "mode": outcome.mode})
+        show({**event, "mode": outcome.mode, "legs_began_s": outcome.legs_began_s})
+    elif kind == "leg":
+        outcome.legs_began_s[event["number"] - 1 :] = [event["began_s"]]
     elif kind == "end" and name == "controller":
         outcome.law = event.get("law")
+        outcome.legs_began_s = event.get("legs_began_s", [])
         outcome.failure = event.get("failure") or outcome.failure
     elif kind == "end" and name == "plant":
         if failure := event.pop("failure"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sitl.flights.scenario import GroundControl, Scenario
+from sitl.flights.scenario import GroundControl, Points, Scenario
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError
 from sitl_bridge.vehicle.law_weights import LawWeights
@@ -23,7 +23,9 @@ def check_feasible(scenario: Scenario | None, vehicle: Vehicle, design: str) -> 
     faults = vehicle_faults(vehicle) or _weight_faults(vehicle, design)
     if not faults and scenario is not None and not isinstance(scenario.reference, GroundControl):
         path = scenario.reference.path(vehicle.initial_load_position)
-        faults = path_faults(path, vehicle, design in FEASIBLE)
+        for number in range(len(path)):
+            key = f"positions.{number}" if isinstance(scenario.reference, Points) else "position"
+            faults += path_faults(path[number : number + 1], vehicle, design in FEASIBLE, key)
     if faults:
         raise DescriptionError(f"{vehicle.name} cannot fly this", faults)
 

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from controller.law.reference import Path
 
 
+MOST_POINTS = 50
+"""Of a sequence: each leg takes tenths of a second to plan."""
+
+
 def _agility() -> Any:
     return quantity("-", "how fast: 0, gentle, to 1, all that the vehicle can do", None, ge=0, le=1)
 
@@ -54,6 +58,23 @@ class Setpoint(Section):
         from controller.law.reference import setpoint
 
         return _agile(setpoint(self.position, start), self.agility)
+
+
+class Points(Section):
+    """The load goes from point to point and stays a while at each; at the last one for good."""
+
+    kind: Literal["points"]
+    positions: tuple[Vector, ...] = quantity(
+        "m", "world ENU, in this order", min_length=1, max_length=MOST_POINTS
+    )
+    hold: float = quantity("s", "from the end of the motion to a point to the next one's", 2.0, ge=0, le=1e4)
+    agility: float | None = _agility()
+
+    def path(self, start: Vector) -> Path:
+        """The legs (n,) for a load that is at `start` (m, world) when the flight begins."""
+        from controller.law.reference import points
+
+        return _agile(points(self.positions, self.hold, start), self.agility)
 
 
 class Circle(Section):
@@ -119,7 +140,7 @@ class GroundControl(Section):
 
 
 Overrides = Sequence[str | Override]
-Moving = Setpoint | Circle | FigureEight | Helix
+Moving = Setpoint | Points | Circle | FigureEight | Helix
 Reference = Annotated[Hover | Moving | GroundControl, Field(discriminator="kind")]
 
 

@@ -77,14 +77,16 @@ def rms(values: Array) -> list[float] | None:
 
 
 def estimate_metrics(
-    state_log: Log, estimate_log: Log, covariance_log: Log, reference: Array
+    state_log: Log, estimate_log: Log, covariance_log: Log, reference: Array, since: float = 0.0
 ) -> dict[str, Any]:
     """`estimate` of summary.json, but for the bound; reference (n, 3) of the load at the state log's rows.
+
+    since: when the last set-point was set, s.
 
     Judged over the steady part of the flight, where both logs have a row; None is what no row tells.
     """
     times, logged = state_log["time_s"], np.stack([estimate_log[name] for name in COLUMNS], axis=1)
-    late = steady(times)
+    late = steady(times, since)
     truth = true_states(state_log)
     row, at = rows_at(times[late], logged[:, 0])
     error = errors(truth[late][row], logged[at, 1 : 1 + len(STATE_COLUMNS)])

@@ -33,7 +33,7 @@ def keep_recording(
 ) -> None:
     """Write what a flight leaves for other tools; nothing where its state log is not complete.
 
-    vehicle: as the controller was told; path: the reference that was flown, None: ground control's; logs:
+    vehicle: as the controller was told; path: the reference as it was flown, None: ground control's; logs:
     how much; report: whether to make MCAP and page.
     """
     try:

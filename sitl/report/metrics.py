@@ -22,8 +22,18 @@ SETTLED_DISTANCE = 0.01  # m, the finer of the two settling times
 HOLDING_DISTANCE = 0.3  # m, near enough for a flight without a step
 
 
+SAME_INSTANT = 1e-6
+"""s"""
+
+
 def reference_positions(path: Path, times: Array) -> Array:
-    """The reference (n, 3) in m, world, as it is set, at each of the times (n,)."""
+    """The reference (n, 3) in m, world, as it is set, at each of the times (n,).
+
+    path: (1,), or the legs of a sequence as they were flown (`points.as_flown`).
+    """
+    if len(path) > 1:
+        leg = np.searchsorted(path["begin"], times + SAME_INSTANT, side="right") - 1
+        return np.asarray(path["centre"][np.maximum(leg, 0)])
     record = path.view(np.recarray)[0]
     derivatives = np.zeros((6, 3))
     if record.radius == 0.0:
@@ -55,10 +65,13 @@ def overshoot_pct(load: Array, start: Array, target: Array) -> float | None:
     return worst
 
 
-def steady(times: Array) -> NDArray[np.bool_]:
-    """Which of the times (n,), s, belong to the steady part of a flight."""
-    end = float(times[-1])
-    return np.asarray(times >= (STEADY_FROM if end > STEADY_FROM else end * 2.0 / 3.0))
+def steady(times: Array, since: float = 0.0) -> NDArray[np.bool_]:
+    """Which of the times (n,), s, belong to the steady part of a flight.
+
+    since: when its last set-point was set, s.
+    """
+    end = float(times[-1]) - since
+    return np.asarray(times >= since + (STEADY_FROM if end > STEADY_FROM else end * 2.0 / 3.0))
 
 
 class Metrics(TypedDict):
@@ -74,15 +87,23 @@ class Metrics(TypedDict):
     tracking_rms_m: float
 
 
-def flight_metrics(times: Array, load: Array, reference: Array, sensing_error_m: float = 0.0) -> Metrics:
+def flight_metrics(
+    times: Array,
+    load: Array,
+    reference: Array,
+    sensing_error_m: float = 0.0,
+    start: Array | None = None,
+) -> Metrics:
     """Metrics of a flight: times (n,) in s, load (n, 3) and reference (n, 3) in m, world.
 
-    A step is a reference that stands still away from where the load begins. sensing_error_m: how far off the
-    sensors may put the load (`sensing_error.sensing_error`); nearer than that no flight is asked to stay.
+    A step is a reference that stands still away from where the load begins: at start (3,), m; None: where
+    it is first. sensing_error_m: how far off the sensors may put the load (`sensing_error.sensing_error`);
+    nearer than that no flight is asked to stay.
     """
     errors = np.linalg.norm(load - reference, axis=1)
+    begin = load[0] if start is None else start
     stands_still = bool(np.all(reference == reference[0]))
-    step = float(errors[0]) if stands_still else 0.0
+    step = float(np.linalg.norm(begin - reference[0])) if stands_still else 0.0
     is_step = step > SETTLED_DISTANCE
     tolerance = max(sensing_error_m, SETTLED_SHARE * step if is_step else HOLDING_DISTANCE)
     end = float(times[-1])
@@ -94,7 +115,7 @@ def flight_metrics(times: Array, load: Array, reference: Array, sensing_error_m:
         "largest_error_at_end_m": float(errors[at_end].max()),
         "settling_time_2pct_s": settling_time(times, errors, SETTLED_SHARE * step) if is_step else None,
         "settling_time_1cm_s": settling_time(times, errors, SETTLED_DISTANCE) if stands_still else None,
-        "overshoot_pct": overshoot_pct(load, load[0], reference[0]) if stands_still else None,
+        "overshoot_pct": overshoot_pct(load, begin, reference[0]) if stands_still else None,
         "steady_state_error_m": float(errors[steady(times)].max()),
         "tracking_rms_m": float(np.sqrt(np.mean(errors[steady(times)] ** 2))),
     }

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sitl.report.metrics import SETTLED_WINDOW
+from sitl.report.points import unset
 from sitl_bridge.vehicle.description import Vehicle
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 TURNED_OVER = math.radians(90.0)
 """Tilt of the vehicle from which on it does not carry any more, rad."""
 RUN_AWAY = 100.0
-"""m of the load from its set-point; ten times what it was at the start, if that is more."""
+"""m of the load from its set-point; ten times the largest step to one, if that is more."""
 CONTACT = 0.02
 """m, by which legs that stand sink in."""
 
@@ -62,6 +63,9 @@ def judge(
 
 
 def _why_unsettled(facts: Mapping[str, Any]) -> str | None:
+    too_soon = unset(facts.get("points"))
+    if too_soon is not None:
+        return too_soon
     error, allowed = facts.get("largest_error_at_end_m"), facts.get("settled_tolerance_m")
     if error is None or allowed is None:
         return None
@@ -115,4 +119,6 @@ def _touches(states: Mapping[str, Array], vehicle: Vehicle) -> NDArray[np.bool_]
 def _far(states: Mapping[str, Array], reference: Array) -> NDArray[np.bool_]:
     load = np.stack([states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
     distance = np.linalg.norm(load - reference, axis=1)
-    return np.asarray(distance > max(RUN_AWAY, 10.0 * float(distance[0])))
+    steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
+    largest = max(float(distance[0]), float(steps.max(initial=0.0)))
+    return np.asarray(distance > max(RUN_AWAY, 10.0 * largest))

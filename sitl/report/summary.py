@@ -18,8 +18,9 @@ from sitl.export.mcap import FILE_NAME as MCAP_NAME
 from sitl.json_values import to_json
 from sitl.recording.recording import REFERENCE_NAME, SUMMARY_NAME, VEHICLE_NAME
 from sitl.report.html_report import FILE_NAME as HTML_NAME
-from sitl.report.metrics import Metrics, flight_metrics, reference_positions
+from sitl.report.metrics import Metrics, reference_positions
 from sitl.report.outcome import judge
+from sitl.report.points import last_set, path_metrics
 from sitl.report.sensing_error import sensing_error
 from sitl_bridge.event_log import FILE_NAME as EVENTS_NAME
 from sitl_bridge.mavlink.tlog import FILE_NAME as TLOG_NAME
@@ -50,6 +51,7 @@ OF_THE_PLANT = tuple(
 PROMISED = (
     *OF_THE_PLANT,
     *Metrics.__annotations__,
+    "points",
     "law",
     "outcome",
     "outcome_time_s",
@@ -101,9 +103,9 @@ def write_report(
 ) -> dict[str, Any]:
     """Write summary.json and the picture next to the state log; returns the summary.
 
-    facts: what is known besides the log; path: the reference, None under ground control or when nothing has
-    flown; vehicle: as the controller was told, where it has left a log of its estimate; described: as it was
-    told in any case; picture: whether to draw one.
+    facts: what is known besides the log; path: the reference as it was flown, None under ground control or
+    when nothing has flown; vehicle: as the controller was told, where it has left a log of its estimate;
+    described: as it was told in any case; picture: whether to draw one.
     """
     state_log = out / FILE_NAME
     summary = {**facts, **{key: None for key in PROMISED if key not in facts}, "settled": False}
@@ -115,18 +117,18 @@ def write_report(
             log = {"time_s": np.zeros(0)}
         if len(log["time_s"]) > 1:
             reference = None if path is None else reference_positions(path, log["time_s"])
-            if reference is not None:
+            if path is not None:
                 seen = (
                     0.0
                     if described is None
                     else sensing_error(described, facts["feedback"], facts["rate_hz"])
                 )
-                summary |= flight_metrics(log["time_s"], positions(log, "load"), reference, seen)
+                summary |= path_metrics(path, log["time_s"], positions(log, "load"), seen)
             summary["settled"] = bool(summary["settled"] and facts.get("completed"))
             if described is not None:
                 summary |= judge(log, reference, described, summary)._asdict()
-            if vehicle is not None and reference is not None and (out / ESTIMATE_NAME).exists():
-                summary["estimate"] = estimate_report(out, log, reference, vehicle, facts["rate_hz"])
+            if vehicle is not None and path is not None and (out / ESTIMATE_NAME).exists():
+                summary["estimate"] = estimate_report(out, log, path, vehicle, facts["rate_hz"])
             if picture:
                 draw(out / PICTURE_NAME, log, reference, facts)
                 summary["picture"] = str(out / PICTURE_NAME)
@@ -153,7 +155,7 @@ def without_files(summary: dict[str, Any]) -> dict[str, Any]:
 
 
 def estimate_report(
-    out: Path, log: Log, reference: NDArray[np.float64], vehicle: Vehicle, rate_hz: float
+    out: Path, log: Log, path: ReferencePath, vehicle: Vehicle, rate_hz: float
 ) -> dict[str, Any] | None:
     """`estimate` of the summary, with the bound of the linear filter; None when its log is not complete."""
     from controller.estimator.riccati_bound import load_relative_bound
@@ -164,9 +166,10 @@ def estimate_report(
         estimates, covariances = (read_state_log(out / name) for name in (ESTIMATE_NAME, COVARIANCE_NAME))
     except (OSError, ValueError):
         return None
+    reference = reference_positions(path, log["time_s"])
     bound = load_relative_bound(vehicle, 1.0 / rate_hz, tuning_for(vehicle, rate_hz))
     return {
-        **estimate_metrics(log, estimates, covariances, reference),
+        **estimate_metrics(log, estimates, covariances, reference, last_set(path)),
         "load_relative_bound_m": bound.tolist(),
         "estimate_log": str(out / ESTIMATE_NAME),
         "covariance_log": str(out / COVARIANCE_NAME),

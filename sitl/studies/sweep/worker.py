@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -103,28 +104,35 @@ def _vehicle(study: dict[str, Any], draw: dict[str, Any]) -> Vehicle | str | Non
 
 def with_reference(scenario: Scenario, key: str, value: Any) -> Scenario:
     """The scenario with one value of its reference changed (`position.0`). Raises DescriptionError."""
-    name, _, index = key.partition(".")
+    name, *indices = key.split(".")
     content = scenario.reference.model_dump()
     if name not in content:
         raise DescriptionError(f"reference.{key}", [f"a {content['kind']} has {', '.join(sorted(content))}"])
-    if index:
-        entries = list(content[name])
-        if not index.isdecimal() or int(index) >= len(entries):
-            raise DescriptionError(f"reference.{key}", [f"expected an index below {len(entries)}"])
-        entries[int(index)] = float(value)
-        value = tuple(entries)
-    content[name] = value
+    content[name] = _with_entry(content[name], indices, value, f"reference.{key}") if indices else value
     try:
         return Scenario.model_validate({**scenario.model_dump(), "reference": content})
     except ValueError as error:
         raise DescriptionError(f"reference.{key}", [str(error).splitlines()[0]]) from None
 
 
+def _with_entry(entries: Any, indices: Sequence[str], value: Any, key: str) -> tuple[Any, ...]:
+    """A list with one number changed, found by an index in it, and in what is there, and so on."""
+    index, *deeper = indices
+    out = list(entries) if isinstance(entries, tuple) else []
+    if not index.isdecimal() or int(index) >= len(out):
+        raise DescriptionError(key, [f"expected an index below {len(out)}" if out else "it has no index"])
+    at = int(index)
+    out[at] = _with_entry(out[at], deeper, value, key) if deeper else float(value)
+    return tuple(out)
+
+
 def _figures(study: dict[str, Any], flight: Flight) -> dict[str, Any]:
     """Outcome and the figures that the study keeps."""
     states, summary = flight.states, flight.summary
     up = 1.0 - 2.0 * (states["attitude_qx"] ** 2 + states["attitude_qy"] ** 2)
+    points = summary["points"] or [summary]
     more = {
+        "largest_overshoot_pct": max((p["overshoot_pct"] or 0.0 for p in points), default=None),
         "largest_tilt_deg": math.degrees(math.acos(max(-1.0, float(np.min(up))))),
         "largest_tension_N": float(np.max(states["cable_tension_N"])),
         "smallest_tension_N": float(np.min(states["cable_tension_N"])),
