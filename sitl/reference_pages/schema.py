@@ -84,7 +84,8 @@ def _range(field: dict[str, Any]) -> str:
     if part.get("type") == "array":
         elements = part.get("prefixItems") or [part.get("items", {})]
         each = _range(elements[0])
-        count = f"{len(elements)} numbers" if "prefixItems" in part else "a list"
+        most = f" of {part.get('minItems', 0)} to {part['maxItems']}" if "maxItems" in part else ""
+        count = f"{len(elements)} numbers" if "prefixItems" in part else f"a list{most}"
         return f"{count}, each {each}" if each else count
     low = _bound(part, "exclusiveMinimum", "above ") or _bound(part, "minimum", "from ")
     high = _bound(part, "exclusiveMaximum", "below ") or _bound(part, "maximum", "to ")

@@ -37,6 +37,7 @@ def is_complete(summary: dict[str, Any]) -> bool:
 
 def _motion(summary: dict[str, Any]) -> list[tuple[str, str]]:
     return [
+        ("points", _points(summary.get("points") or [])),
         ("2 % settling time", _with_unit(summary.get("settling_time_2pct_s"), "s", 2)),
         ("1 cm settling time", _with_unit(summary.get("settling_time_1cm_s"), "s", 2)),
         ("overshoot", _with_unit(summary.get("overshoot_pct"), "%", 1)),
@@ -74,6 +75,15 @@ def _outcome(summary: dict[str, Any]) -> str:
 
 
 IN_WORDS = {"turned over": "UPSIDE DOWN", "hit the ground": "CRASHED"}
+
+
+def _points(points: list[dict[str, Any]]) -> str:
+    """Of a sequence: from when on its figures count, and the worst of all overshoots."""
+    if not points:
+        return ""
+    worst = max(point["overshoot_pct"] or 0.0 for point in points)
+    last = points[-1]["set_at_s"]
+    return f"{len(points)}, the last one set at {last:.2f} s; overshoot up to {worst:.1f} %; at the last one:"
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

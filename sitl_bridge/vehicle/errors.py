@@ -58,7 +58,7 @@ class _Place(NamedTuple):
 def fault_lines(model: type[BaseModel], errors: Sequence[Any]) -> list[PhysicsFault]:
     """A fault with its key for each of pydantic's errors."""
     # A list that seems short only because one of its entries is at fault is no fault of its own.
-    followed = {error["loc"][:1] for error in errors if len(error["loc"]) > 1}
+    followed = {error["loc"][:depth] for error in errors for depth in range(1, len(error["loc"]))}
     found: list[PhysicsFault] = []
     meant: set[Location] = set()
     for error in errors:
@@ -137,12 +137,12 @@ def _line(place: _Place, fault: Any) -> str:
         return _tag_line(where, fault)
     unit = unit_of(field)
     problem = _PROBLEMS.get(kind, fault["msg"].removeprefix("Value error, "))
-    if kind == "missing":
-        return f"{where}: missing; expected {_expectation(field) or 'a value'}{f' in {unit}' if unit else ''}"
-    if kind == "value_error":
-        return f"{where}: {problem}" if where else problem
     of_list = bool(place.keys) and isinstance(place.keys[-1], int)
     allowed = _expectation(field, entry=of_list)
+    if kind == "missing":
+        return f"{where}: missing; expected {allowed or 'a value'}{f' in {unit}' if unit else ''}"
+    if kind == "value_error":
+        return f"{where}: {problem}" if where else problem
     value = f"{where} = {shown(fault['input'])}{f' {unit}' if unit else ''}"
     return (
         f"{value}: {problem[0].lower()}{problem[1:]}{f'; allowed: {allowed}' if allowed else ''}"
@@ -232,8 +232,9 @@ def _expectation(field: FieldInfo | None, entry: bool = False) -> str:
     lengths = [
         getattr(m, name) for m in metadata for name in ("min_length", "max_length") if hasattr(m, name)
     ]
-    if len(lengths) == 2:
-        return "a table" if entry else "{} to {} tables".format(*lengths)
+    tables = next(tables_of(field.annotation), None) is not None
+    if len(lengths) == 2 and (tables or not entry):
+        return "a table" if entry else "{} to {} {}".format(*lengths, "tables" if tables else "entries")
     words: dict[str, None] = {}
     for mark in metadata:
         for kind, name, sign in (

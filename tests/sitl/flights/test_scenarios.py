@@ -10,6 +10,7 @@ import pytest
 import sitl
 from sitl.flights.scenario import (
     GroundControl,
+    Points,
     load_scenario,
     plant_vehicle,
     scenario_names,
@@ -56,7 +57,8 @@ def test_who_asks_for_the_ground_gets_it() -> None:
 @pytest.mark.parametrize("scenario", FLOWN)
 def test_every_scenario_flies_every_vehicle(scenario: str, vehicle: str) -> None:
     """Upright, in the air, and within metres of where it is to be."""
-    flight = sitl.fly(scenario, vehicle=vehicle, duration_s=12.0)
+    sequence = isinstance(load_scenario(scenario).reference, Points)  # is judged at its last point
+    flight = sitl.fly(scenario, vehicle=vehicle, duration_s=None if sequence else 12.0)
     summary, log = flight.summary, flight.states
     assert summary["completed"], flight.said
     upright = 1.0 - 2.0 * (log["attitude_qx"] ** 2 + log["attitude_qy"] ** 2)

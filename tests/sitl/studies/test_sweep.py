@@ -13,12 +13,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sitl.flights.scenario import Points, load_scenario
 from sitl.studies.random_vehicles import random_vehicle
 from sitl.studies.sweep.dataset import read_rows, write_rows
 from sitl.studies.sweep.draws import draws
 from sitl.studies.sweep.study import RandomVehicles, Study, Vary, Verdict, load_study
 from sitl.studies.sweep.verdicts import judge
-from sitl.studies.sweep.worker import fly_draw
+from sitl.studies.sweep.worker import fly_draw, with_reference
 from sitl_bridge.vehicle.files import DescriptionError
 from tests.patience import LONG_PATIENCE
 
@@ -167,6 +168,27 @@ def test_sixty_random_vehicles_fly_steps_of_every_length() -> None:
     assert {row["outcome"] for row in rows} <= {"settled", "did not settle"}, rows
     assert sum(row["outcome"] == "settled" for row in rows) >= 57
     assert max(row["overshoot_pct"] or 0.0 for row in rows) <= 10.0
+
+
+def test_a_dozen_random_vehicles_fly_from_point_to_point() -> None:
+    """The beginning of studies/random-points.toml: no fall, no overshoot beyond 10 % at any point."""
+    full = load_study(STUDIES / "random-points.toml")
+    plain = full.model_dump(mode="json")
+    rows = [fly_draw(plain, draw.inputs, None) for draw in draws(full)[:12]]
+    assert {row["outcome"] for row in rows} == {"settled"}, rows
+    assert max(row["largest_overshoot_pct"] for row in rows) <= 10.0
+
+
+def test_a_number_in_a_list_of_a_list_is_found_by_its_indices() -> None:
+    changed = with_reference(load_scenario("points"), "positions.1.2", 9.0).reference
+    before = load_scenario("points").reference
+    assert isinstance(changed, Points)
+    assert isinstance(before, Points)
+    assert changed.positions[1] == (*before.positions[1][:2], 9.0)
+    assert changed.positions[0] == before.positions[0]
+    for key in ("positions.9.0", "positions.0.3", "positions.0.0.0", "positions.x.0", "hold.0"):
+        with pytest.raises(DescriptionError, match=key):
+            with_reference(load_scenario("points"), key, 9.0)
 
 
 @pytest.mark.parametrize("name", ["random-circles", "random-figure-eights", "random-helices"])
