@@ -12,7 +12,7 @@ from collections.abc import Callable
 from controller.law.reference import Path
 from sitl_bridge.frames import MICROSECONDS_PER_SECOND
 
-CABLE_LAGS = 10.0
+CABLE_LAGS = 5.0
 """Time constants of the cable for which a leg goes on at least: the next begins with the stretch at rest."""
 OnLeg = Callable[[int, int, float], None]
 """Is told which leg begins, from 1, of how many, and when, s since the law took over."""

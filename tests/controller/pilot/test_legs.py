@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -111,6 +112,25 @@ def test_whole_ticks_fly_the_legs_as_ticks_in_parts_do(
     assert flown_whole == 0
     assert began == began_in_parts
     np.testing.assert_array_equal(whole, parts)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.1])
+def test_without_a_stay_the_next_leg_begins_without_a_jump(lag: float) -> None:
+    """On an overdamped cable, too, whose stretch is behind: the load is where its legs have it."""
+    overrides = ["initial.load_position=[0,0,5]", f"cable.damping={70.0 if lag else 2.0}"]
+    overrides += [f"rotors.{rotor}.time_constant={lag / 4.0}" for rotor in range(4)]
+    flight = sitl.fly(
+        scenario(0.0), vehicle=load_vehicle("paper", overrides), feedback="truth", duration_s=20.0
+    )
+    assert flight.summary["settled"]
+    for point in flight.summary["points"]:
+        assert point["overshoot_pct"] < 0.5, point
+    jumps = np.abs(np.diff(flight.states["cable_tension_N"]))
+    load = np.stack([flight.states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
+    for before, point in itertools.pairwise(flight.summary["points"]):
+        tick = round(point["set_at_s"] * RATE_HZ)
+        assert jumps[tick - 1 : tick + 5].max() < 1e-3  # of 98 N
+        assert np.linalg.norm(load[tick] - before["position_m"]) < 5e-3 * before["step_m"]
 
 
 def test_what_the_law_has_learnt_stays_from_leg_to_leg() -> None:

@@ -135,6 +135,8 @@ def test_ground_control_has_no_way_and_a_set_point_a_straight_one() -> None:
     assert len(Way(load_scenario("hold"), iris).points) == 0
     assert Way(load_scenario("hold"), iris).set_point(1.0) is None
     assert len(Way(load_scenario("setpoint"), iris).points) == 2
+    assert len(Way(load_scenario("points"), iris).points) == 5
+    assert Way(load_scenario("points"), iris).set_point(1.0) is None  # the autopilot knows which it is
 
 
 def test_what_is_not_known_is_not_plotted() -> None:
