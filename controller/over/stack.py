@@ -6,17 +6,15 @@ The defaults are those measured on PX4 SITL. `sitl identify` measures a stack an
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ValidationError
-
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.files import DescriptionError
+from sitl_bridge.vehicle.files import DescriptionError, validated
 from sitl_bridge.vehicle.rotors import full_thrust as all_rotors
 from sitl_bridge.vehicle.schema import Section, quantity
+from sitl_bridge.vehicle.toml_files import toml_content, toml_text, what_is_wrong
 
 Kind = Literal["px4", "ardupilot"]
 
@@ -59,16 +57,14 @@ def thrust_setpoint(force: float, full: float, curve: float) -> float:
 def read_stack(file: Path) -> Stack:
     """A stack from a TOML file; raises DescriptionError with a line for each fault."""
     try:
-        return Stack.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
+        content = toml_content(toml_text(file))
     except OSError as error:
         raise DescriptionError(
             str(file), [f"{error.strerror}; expected a file that `sitl identify` wrote"]
         ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(str(file), [str(error)]) from None
-    except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
-        raise DescriptionError(str(file), lines) from None
+    except ValueError as error:
+        raise DescriptionError(str(file), [what_is_wrong(error)]) from None
+    return validated(Stack, content, str(file))
 
 
 def stack_text(stack: Stack, remarks: Sequence[str]) -> str:

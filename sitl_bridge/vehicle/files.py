@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import deepcopy
-from functools import lru_cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +16,7 @@ from sitl_bridge.vehicle.overrides import Override, apply_overrides
 from sitl_bridge.vehicle.physics import PhysicsFault, physics_faults
 from sitl_bridge.vehicle.schema import Section
 from sitl_bridge.vehicle.sensors import Sensors
+from sitl_bridge.vehicle.toml_files import toml_content, toml_text, what_is_wrong
 from sitl_bridge.vehicle.toml_lines import line_of
 
 __all__ = [
@@ -72,8 +71,7 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
     """
     entry = Path(name_or_file) if is_path(name_or_file) else folder / f"{name_or_file}.toml"
     try:
-        text = entry.read_text(encoding="utf-8")
-        return name_or_file, deepcopy(_parsed(text))
+        return name_or_file, deepcopy(toml_content(toml_text(entry)))
     except FileNotFoundError:
         known = shipped(folder)
         raise DescriptionError(
@@ -83,18 +81,8 @@ def read_toml(name_or_file: str, folder: Any, kind: str) -> tuple[str, dict[str,
                 f"{did_you_mean(name_or_file, known)}"
             ],
         ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise DescriptionError(name_or_file, [f"not valid TOML: {error}"]) from None
-    except RecursionError:
-        raise DescriptionError(name_or_file, ["not valid TOML: nested too deeply"]) from None
-    except (OSError, ValueError) as error:  # ValueError: not UTF-8, or no possible path
-        raise DescriptionError(name_or_file, [f"cannot be read: {error}"]) from None
-
-
-@lru_cache(maxsize=64)
-def _parsed(text: str) -> dict[str, Any]:
-    """A study reads the same few files for each of its flights."""
-    return tomllib.loads(text)
+    except (OSError, ValueError) as error:
+        raise DescriptionError(name_or_file, [what_is_wrong(error)]) from None
 
 
 def load_vehicle(vehicle: str | Vehicle, overrides: Iterable[str | Override] = ()) -> Vehicle:
@@ -176,7 +164,7 @@ def _origin(source: str, overrides: Sequence[Override]) -> Origin:
         if not is_path(source) or not location:
             return ""
         try:
-            line = line_of(Path(source).read_text(encoding="utf-8"), location)
+            line = line_of(toml_text(Path(source)), location)
         except (OSError, ValueError):  # it was there a moment ago
             return ""
         return "" if line is None else f"line {line}"

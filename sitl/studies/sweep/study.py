@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import model_validator
 
 from sitl_bridge.vehicle.files import DescriptionError, beside, validated
 from sitl_bridge.vehicle.schema import Section, quantity
+from sitl_bridge.vehicle.toml_files import toml_content, toml_text, what_is_wrong
 
 Value = str | float | int | bool | tuple[float, ...]
 
@@ -120,11 +120,11 @@ class Study(Section):
 def load_study(file: Path) -> Study:
     """Read a study; raises DescriptionError with a line for each fault. Paths are relative to its folder."""
     try:
-        content: Any = tomllib.loads(file.read_text(encoding="utf-8"))
+        content = toml_content(toml_text(file))
     except OSError as error:
         raise DescriptionError(str(file), [f"{error.strerror}; expected a study, a .toml file"]) from None
     except ValueError as error:
-        raise DescriptionError(str(file), [f"not valid TOML: {error}"]) from None
+        raise DescriptionError(str(file), [what_is_wrong(error)]) from None
     study = validated(Study, content, str(file))
     vary = tuple(_vehicles_beside(entry, str(file)) for entry in study.vary)
     return study.model_copy(update={"scenario": beside(study.scenario, str(file)), "vary": vary})
