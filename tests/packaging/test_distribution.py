@@ -135,6 +135,18 @@ def test_pictures_and_pages_of_the_readme_are_found_from_an_index_page(metadata:
     assert [target for target in targets if not target.startswith(("https://", "#"))] == []
 
 
+def test_every_copy_of_the_repositorys_address_is_the_same(metadata: Message) -> None:
+    """Who puts the true one in must not miss a copy; docs/installing.md names the files."""
+    home = PROJECT["urls"]["Homepage"]
+    assert all(url.startswith(home) for url in PROJECT["urls"].values())
+    assert f"repo_url: {home}\n" in (TOP / "mkdocs.yml").read_text(encoding="utf-8")
+    raw = home.replace("github.com", "raw.githubusercontent.com")
+    elsewhere = [part.partition(")")[0] for part in str(metadata.get_payload()).split("](http")[1:]]
+    assert elsewhere
+    assert [url for url in elsewhere if not f"http{url}".startswith((f"{home}/", f"{raw}/"))] == []
+    assert f"`{home}`" in (TOP / "docs/installing.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("attempt", "refusal"),
     [
