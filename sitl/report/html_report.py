@@ -93,8 +93,7 @@ def _figure(recording: Recording) -> dict[str, Any]:
         x, y = envelope(times, values)
         panel = panels.index(title) + 1
         axis = "" if panel == 1 else str(panel)
-        rounded = ([float(f"{v:.6g}") for v in column] for column in (x.tolist(), y.tolist()))
-        trace = dict(zip("xy", rounded, strict=True)) | {"name": name, "type": "scatter", "mode": "lines"}
+        trace = _points(x, y) | {"name": name, "type": "scatter", "mode": "lines"}
         traces.append({**trace, "xaxis": "x", "yaxis": f"y{axis}", "legendgroup": str(panel), **style})
 
     for index, letter in enumerate("xyz"):
@@ -114,6 +113,11 @@ def _figure(recording: Recording) -> dict[str, Any]:
         line(ROTORS, f"rotor {rotor + 1}", controls[:, rotor], line={"width": 1})
     _add_terms(traces, recording, panels)
     return {"data": traces, "layout": _layout(recording, panels)}
+
+
+def _points(x: Array, y: Array, digits: int = 6) -> dict[str, list[float]]:
+    """A line's points, with as many digits as can be seen."""
+    return {key: [float(f"{v:.{digits}g}") for v in values.tolist()] for key, values in (("x", x), ("y", y))}
 
 
 def _panels(recording: Recording) -> list[str]:
@@ -140,10 +144,9 @@ def _add_terms(traces: list[dict[str, Any]], recording: Recording, panels: Seque
                 "dash": "dot" if about == " about y" else "solid",
             }
             trace = {"type": "scatter", "mode": "lines", "legendgroup": str(panel), "line": style}
-            rounded = {
-                key: [float(f"{v:.4g}") for v in values.tolist()] for key, values in (("x", x), ("y", y))
-            }
-            traces.append({**trace, **rounded, "name": term + about, "xaxis": "x", "yaxis": f"y{panel}"})
+            traces.append(
+                {**trace, **_points(x, y, 4), "name": term + about, "xaxis": "x", "yaxis": f"y{panel}"}
+            )
 
 
 def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, colour: str) -> None:
@@ -154,17 +157,16 @@ def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, c
     common = {"type": "scatter", "mode": "lines", "yaxis": "y", "legendgroup": "1"}
     x, y = envelope(estimates["time_s"], estimates[f"load_{letter}_m"])
     dotted = {"color": colour, "width": 1, "dash": "dot"}
-    traces.append(
-        {**common, "x": x.tolist(), "y": y.tolist(), "name": f"{letter}, estimated", "line": dotted}
-    )
+    traces.append({**common, **_points(x, y), "name": f"{letter}, estimated", "line": dotted})
     if recording.covariance is None:
         return
     times, deviations = two_sigma(recording.covariance, "xyz".index(letter))
     middle = np.interp(times, estimates["time_s"], estimates[f"load_{letter}_m"])
-    edge = {**common, "x": times.tolist(), "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
-    traces.append({**edge, "y": (middle - deviations).tolist(), "name": f"{letter}, lower edge"})
+    edge = {**common, "line": {"width": 0}, "hoverinfo": "skip", "showlegend": False}
+    lower, upper = _points(times, middle - deviations), _points(times, middle + deviations)
+    traces.append({**edge, **lower, "name": f"{letter}, lower edge"})
     band = {"fill": "tonexty", "fillcolor": colour + "22", "showlegend": True, "name": f"{letter}, ±2 σ"}
-    traces.append({**edge, "y": (middle + deviations).tolist(), **band})
+    traces.append({**edge, **upper, **band})
 
 
 def _layout(recording: Recording, panels: Sequence[str]) -> dict[str, Any]:
@@ -176,7 +178,6 @@ def _layout(recording: Recording, panels: Sequence[str]) -> dict[str, Any]:
         "margin": {"l": 70, "r": 20, "t": 60, "b": 50},
         "hovermode": "x unified",
         "legend": {"traceorder": "grouped"},
-        "template": "plotly_white",
         "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(panels)}"},
         "shapes": [
             *_shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
