@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import math
 from pathlib import Path
 
@@ -15,6 +16,8 @@ OUT = Path(__file__).parents[1] / "docs" / "images" / "cables.png"
 
 
 def main() -> None:
+    """Draw."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     figure, (curves, losses) = plt.subplots(1, 2, figsize=(9.0, 3.4), layout="constrained")
     speeds = 10.0 ** np.linspace(-3.0, 2.0, 400)
     x = speeds[:, None] / BRANCH_SPEEDS

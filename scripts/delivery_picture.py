@@ -7,6 +7,7 @@ python scripts/delivery_picture.py runs/delivery/state.parquet docs/images/deliv
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -48,5 +49,16 @@ def picture(log: Path) -> bytes:
     return png(figure)
 
 
+def main() -> None:
+    """Draw."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("log", type=Path, help="state log of the flight")
+    parser.add_argument("picture", type=Path, help="PNG to write")
+    arguments = parser.parse_args()
+    arguments.picture.write_bytes(picture(arguments.log))
+
+
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_bytes(picture(Path(sys.argv[1])))
+    main()

@@ -5,6 +5,7 @@ python scripts/drag_picture.py
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -20,6 +21,10 @@ from tests.plant.physics.test_ground_flight import PERIOD, flown  # noqa: E402
 
 def main() -> None:
     """Fly and draw."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.parse_args()
     _, logs = flown()
     figure, (side, over_time) = plt.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
     began = 0.0

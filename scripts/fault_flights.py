@@ -1,6 +1,7 @@
 """Flies the flights of docs/faults.md: prints the table, draws docs/images/faults.png.
 
-    python scripts/fault_flights.py
+    python scripts/fault_flights.py                    # all of them
+    python scripts/fault_flights.py gps "rotor 1"      # some, and no picture
 
 Plant and autopilot as they are, on a clock of their own instead of a wall clock, in one process; `iris` at
 250 Hz, hovering with its load in moderate turbulence (always the same), fed back the estimate from its
@@ -9,6 +10,7 @@ sensors, one fault from t = 5 s on.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 from typing import Any, get_args
@@ -73,6 +75,7 @@ FLIGHTS = {
     "link: stall of 0.1 s": {"link": [{"failure": "stall", "at": AT, "duration": 0.1}]},
     "link: stall of 1 s": {"link": [{"failure": "stall", "at": AT, "duration": 1.0}]},
 }
+PICTURE = ROOT / "docs" / "images" / "faults.png"
 DRAWN = {
     "sensors": ("none", "accelerometer wrong", "gyroscope stuck", "barometer wrong", "gps lost", "gps wrong"),
     "the rest": (
@@ -130,13 +133,23 @@ def tilt(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def main() -> None:
     """Fly, print, draw."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("words", nargs="*", help="fly only faults whose name has one of these words")
+    parser.add_argument(
+        "--picture", type=Path, help=f"PNG to draw; of all flights by default {PICTURE.relative_to(ROOT)}"
+    )
+    arguments = parser.parse_args()
+    wanted = [name for name in FLIGHTS if not arguments.words or any(w in name for w in arguments.words)]
+    if not wanted:
+        parser.error(f"no fault has one of these words in its name: {' '.join(arguments.words)}")
+    picture = arguments.picture or (None if arguments.words else PICTURE)
     figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained", sharey=True)
     print("| fault at 5 s | vehicle strays by, m | largest tilt, deg | 15 s later, m | outcome |")
     print("|---|---|---|---|---|")
-    for name, table in FLIGHTS.items():
-        if len(sys.argv) > 1 and not any(word in name for word in sys.argv[1:]):
-            continue
-        rows = fly(table)
+    for name in wanted:
+        rows = fly(FLIGHTS[name])
         after = rows[rows[:, 0] >= AT]
         away = np.linalg.norm(after[:, 1:4] - rows[0, 1:4], axis=1)
         down = rows[-1, 3] < 0.5
@@ -153,7 +166,8 @@ def main() -> None:
         axes.legend(fontsize=8, loc="lower center", ncols=2)
         axes.grid(alpha=0.3, which="both")
     panels[0].set_ylabel("vehicle from where it hovered / m")
-    figure.savefig(ROOT / "docs" / "images" / "faults.png", dpi=110)
+    if picture is not None:
+        figure.savefig(picture, dpi=110)
 
 
 if __name__ == "__main__":

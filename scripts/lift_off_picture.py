@@ -7,6 +7,7 @@ Plant and controller as processes of their own, in lockstep; MAVSDK says what to
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import sys
 import tempfile
@@ -65,6 +66,10 @@ def fly() -> dict[str, NDArray[np.float64]]:
 
 def main() -> None:
     """Fly and draw."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.parse_args()
     log = fly()
     time = log["time_s"]
     east, up = log["vehicle_x_m"], log["vehicle_z_m"]

@@ -1,13 +1,15 @@
 """Makes a moving picture of a flight: the page of `sitl view`, seen by a headless Chromium.
 
-usage: python scripts/moving_picture.py docs/images/flight.webp     needs the extra [test], and Chromium
+    python scripts/moving_picture.py docs/images/flight.webp
+
+Needs the extra [test], and Chromium.
 """
 
 from __future__ import annotations
 
+import argparse
 import io
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
@@ -40,8 +42,13 @@ LARGEST = 1_500_000
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic"]
 
 
-def main(file: Path) -> None:
+def main() -> None:
     """Fly, look, write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("file", type=Path, help="WebP to write")
+    file = parser.parse_args().file
     frames = _frames()
     for quality in (70, 55, 40, 25):
         first, *others = frames
@@ -94,4 +101,4 @@ def _look(server: viser.ViserServer, view: View) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()
