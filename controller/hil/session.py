@@ -108,6 +108,7 @@ class HilSession:
         self._out: list[bytes] = []
         self._last_time = 0
         self._last_answer: bytes | None = None
+        self._last_tick = b""  # the datagram to which that was the answer, if given in one compiled call
         self._armed_at: int | None = None
         """`time_usec` of the first armed answer"""
         self._last_heard: float | None = None
@@ -136,8 +137,14 @@ class HilSession:
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the plant; the answer is in `to_send`."""
-        if self._plain_tick is not None and self._answer_plainly(self._plain_tick, datagram, now):
-            return
+        if self._plain_tick is not None:
+            if datagram == self._last_tick and self._last_answer is not None:
+                self._out.append(self._last_answer)  # the answer was lost
+                self._last_heard = now
+                return
+            if self._answer_plainly(self._plain_tick, datagram, now):
+                self._last_tick = datagram
+                return
         tick = self._reader.read(datagram)
         for frame in tick.others:
             self._autopilot.hear(frame, now)
@@ -208,7 +215,7 @@ class HilSession:
             if estimate is None and self._feedback.needs_truth and now >= self._next_request:
                 self._next_request = now + REQUEST_INTERVAL
                 self._request(ODOMETRY.message_id, 0.0)
-        self._last_time = time_usec
+        self._last_time, self._last_tick = time_usec, b""
         self._last_answer = self._writer.answer(time_usec, self._autopilot.armed)
         self._out.append(self._last_answer)
 

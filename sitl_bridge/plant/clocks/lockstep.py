@@ -156,9 +156,12 @@ class Lockstep:
 
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the autopilot."""
-        at_once = self._state is State.WAITING and self._repeats == 0
-        if at_once and self._on_silence == "wait" and self.simulation.fly_whole_tick(datagram):
-            self._answered(now)
+        at_once = self._state is State.WAITING and self._on_silence == "wait"
+        time_usec = self.simulation.time_usec
+        if at_once and self.simulation.fly_whole_tick(datagram):
+            if self._repeats > 0:
+                self._notices.over("silence", "autopilot answers again")
+            self._answered(now, time_usec)
             return
         answer = self._receiver
         if not answer.receive(datagram):
@@ -176,7 +179,7 @@ class Lockstep:
         if begins:
             self.simulation.begin()
         self._advance(answer.controls)
-        self._answered(now)
+        self._answered(now, answer.time_usec)
         if begins:  # what came before was start-up, and this tick was planned in
             self._timer = RetransmissionTimer()
 
@@ -223,13 +226,13 @@ class Lockstep:
         else:
             self.simulation.next_tick()
 
-    def _answered(self, now: float) -> None:
-        """The current tick is over, the next is due."""
+    def _answered(self, now: float, time_usec: int) -> None:
+        """The tick of `time_usec` is over, the next is due."""
         if self._repeats == 0:
             self._timer.sample(now - self._sent_at)
         else:
             self._timer.over()
-            self._repeated_usec = self._receiver.time_usec
+            self._repeated_usec = time_usec
         self._state, self._repeats = State.READY, 0
         self._due = now
         if self._pace is None:

@@ -7,7 +7,8 @@ The RFC's own time-out, the smoothed round trip and four variations, is always s
 on, the variation never exceeds twice the smoothed round trip. So it is not kept.
 
 Karn's algorithm: an answer to a repeated tick may belong to any of its sendings, so it is no sample. The
-time-out doubles with each repeat of a tick.
+time-out doubles with each repeat of a tick; once there is a sample, not with the first: that one, too, may
+have been lost, and ten round trips are long enough for the second to be answered.
 
 A time-out that is too short shows by a second answer to a repeated tick: the first was under way, the repeat
 needless. The time-out then doubles and stays doubled until there is a sample. Otherwise a round trip that has
@@ -39,8 +40,11 @@ class RetransmissionTimer:
 
     def timeout(self) -> float:
         """s to wait for the answer to what is sent now."""
-        base = FIRST_TIMEOUT if self._smoothed is None else ROUND_TRIPS * self._smoothed
-        doublings = min(_MOST_DOUBLINGS, self._repeats + self._needless)
+        if self._smoothed is None:
+            base, repeats = FIRST_TIMEOUT, self._repeats
+        else:
+            base, repeats = ROUND_TRIPS * self._smoothed, max(0, self._repeats - 1)
+        doublings = min(_MOST_DOUBLINGS, repeats + self._needless)
         return min(LONGEST_TIMEOUT, base * 2.0**doublings)
 
     def sample(self, round_trip: float) -> None:

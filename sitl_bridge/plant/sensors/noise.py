@@ -55,10 +55,13 @@ class GaussMarkov:
         self._keep = math.exp(-period / time_constant)
         self._kick = std * math.sqrt(-math.expm1(-2.0 * period / time_constant))
         self._generator = generator
+        self._still = not std.any()
         self.value: Array = std * generator.standard_normal(len(std))
 
     def step(self) -> Array:
         """The value (axes,) one period on."""
+        if self._still:
+            return self.value
         self.value = self._keep * self.value + self._kick * self._generator.standard_normal(len(self._kick))
         return self.value
 

@@ -265,8 +265,9 @@ class TickWriter:
         self._origin = origin
         outbox = np.zeros(1, dtype=OUTBOX)
         fields = outbox[0]
-        self._records: NDArray[Any] = fields["messages"]
-        record = self._records[0]
+        records: NDArray[Any] = fields["messages"]
+        record = records[0]
+        self._gps = records["gps"]
         record["vehicle"]["frame_id"] = FRAME_LOCAL_NED
         record["vehicle"]["child_frame_id"] = FRAME_BODY_FRD
         record["load"]["frame_id"] = record["load"]["child_frame_id"] = FRAME_LOCAL_NED
@@ -303,20 +304,25 @@ class TickWriter:
         return bytes(self._view[:length])
 
     def _fill_gps(self, time_usec: int, fix: GpsFix) -> None:
-        record = self._records[0]["gps"]
         point = self._origin.geodetic(fix.position)
         north, east, down = enu_to_ned(fix.velocity)
         ground_speed = math.hypot(north, east)
-        record["time_usec"] = max(0, time_usec - round(fix.age * MICROSECONDS_PER_SECOND))
-        record["lat"] = whole(point.latitude * DEG_E7_PER_DEG, 32)
-        record["lon"] = whole(point.longitude * DEG_E7_PER_DEG, 32)
-        record["alt"] = whole(point.altitude * MILLIMETRES_PER_METRE, 32)
-        record["eph"] = whole(fix.horizontal_accuracy * CENTIMETRES_PER_METRE, 16, signed=False)
-        record["epv"] = whole(fix.vertical_accuracy * CENTIMETRES_PER_METRE, 16, signed=False)
-        record["vel"] = whole(ground_speed * CENTIMETRES_PER_METRE, 16, signed=False)
-        for name, value in (("vn", north), ("ve", east), ("vd", down)):
-            record[name] = whole(value * CENTIMETRES_PER_METRE, 16)
         course = math.atan2(east, north) % (2 * math.pi)
-        record["cog"] = whole(course * CENTIDEGREES_PER_RADIAN, 16, signed=False) % 36000
-        record["fix_type"] = fix.fix_type
-        record["satellites_visible"] = fix.satellites
+        # All at once, in the order of HIL_GPS: field by field takes several times as long.
+        self._gps[0] = (
+            max(0, time_usec - round(fix.age * MICROSECONDS_PER_SECOND)),
+            whole(point.latitude * DEG_E7_PER_DEG, 32),
+            whole(point.longitude * DEG_E7_PER_DEG, 32),
+            whole(point.altitude * MILLIMETRES_PER_METRE, 32),
+            whole(fix.horizontal_accuracy * CENTIMETRES_PER_METRE, 16, signed=False),
+            whole(fix.vertical_accuracy * CENTIMETRES_PER_METRE, 16, signed=False),
+            whole(ground_speed * CENTIMETRES_PER_METRE, 16, signed=False),
+            whole(north * CENTIMETRES_PER_METRE, 16),
+            whole(east * CENTIMETRES_PER_METRE, 16),
+            whole(down * CENTIMETRES_PER_METRE, 16),
+            whole(course * CENTIDEGREES_PER_RADIAN, 16, signed=False) % 36000,
+            fix.fix_type,
+            fix.satellites,
+            0,  # id
+            0,  # yaw: not available
+        )

@@ -7,9 +7,11 @@ import pytest
 from pymavlink.dialects.v20 import common
 
 from controller.hil.session import PLANT_TIMEOUT, HilSession
-from sitl_bridge.mavlink.framing import Frame, decode, split
+from sitl_bridge.ids import COMPONENT_TRUTH
+from sitl_bridge.mavlink.framing import Frame, Packer, decode, split
 from sitl_bridge.mavlink.hil import HIL_ACTUATOR_CONTROLS, MODE_FLAG_ARMED
 from sitl_bridge.plant.simulation import Simulation
+from sitl_bridge.plant.wire.slow_frames import plant_heartbeat
 from tests.plant.network import autopilot_session, paper, simulation
 
 
@@ -72,6 +74,17 @@ def test_a_repeated_tick_gets_the_same_bytes_without_a_second_step() -> None:
     first, again = answers(link.give(datagram)), answers(link.give(datagram))
     assert first[0].raw == again[0].raw
     assert link.session.steps == 4
+
+
+def test_a_tick_that_is_overtaken_by_an_odd_one_gets_no_answer() -> None:
+    link = Link()
+    for _ in range(4):
+        link.tick()
+    in_one_call = link.simulation.datagram()
+    assert answers(link.tick())
+    heartbeat = Packer(1, COMPONENT_TRUTH).pack(plant_heartbeat())
+    assert answers(link.give(heartbeat + link.simulation.datagram()))
+    assert link.give(in_one_call) == []
 
 
 def test_an_overtaken_tick_gets_no_answer() -> None:

@@ -126,9 +126,23 @@ def test_the_whole_tick_is_taken_where_there_is_one() -> None:
     c.answer(2, after=0.001)
     assert c.simulation.done == ["flown whole"]
     assert c.send() == [b"tick 3"]
-    c.send(FIRST_TIMEOUT + 1.0)  # repeated: the datagram is taken apart
+    waited = c.wait
+    c.send_when_due()
+    c.answer(3)  # of a tick that was repeated, too
+    assert c.simulation.done == ["flown whole"] * 2
+    c.simulation.flies_whole = False  # an answer to a tick that is over
     c.answer(3)
-    assert c.simulation.done == ["flown whole", ("flown", [0.0] * 4)]
+    c.send()
+    assert c.wait == pytest.approx(2 * waited)
+
+
+def test_an_autopilot_is_back_with_a_whole_tick_too() -> None:
+    c = Clock().in_flight()
+    for _ in range(REPEATS_BEFORE_NOTICE + 1):
+        c.send(SILENCE_BEFORE_NOTICE)
+    c.simulation.flies_whole = True
+    c.answer(2)
+    assert c.said == [SILENT, BACK]
 
 
 def test_the_whole_tick_is_not_taken_where_the_last_controls_have_to_be_known() -> None:

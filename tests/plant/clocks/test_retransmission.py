@@ -49,13 +49,13 @@ def test_a_stall_makes_the_timeout_an_eighth_longer_at_most() -> None:
     assert timer.timeout() == pytest.approx(9 / 8 * before)
 
 
-def test_the_timeout_doubles_with_each_repeat_of_a_tick_and_is_the_plain_one_for_the_next() -> None:
+def test_the_timeout_doubles_from_a_ticks_second_repeat_on_and_is_the_plain_one_for_the_next() -> None:
     timer = RetransmissionTimer()
     timer.sample(1e-4)
     before = timer.timeout()
     for repeat in range(1, 4):
         timer.expired()
-        assert timer.timeout() == pytest.approx(2**repeat * before)
+        assert timer.timeout() == pytest.approx(2 ** (repeat - 1) * before)
     timer.over()
     assert timer.timeout() == before
 
@@ -67,6 +67,8 @@ def test_after_a_needless_repeat_the_timeout_stays_doubled_until_there_is_a_samp
     timer.expired()
     timer.over()
     timer.repeated_needlessly()
+    assert timer.timeout() == pytest.approx(2 * before)
+    timer.expired()
     assert timer.timeout() == pytest.approx(2 * before)
     timer.expired()
     assert timer.timeout() == pytest.approx(4 * before)
