@@ -87,6 +87,8 @@ class Machine:
         self.notices: list[Notice] = []
         self.view: VehicleView | None = None
         self.guidance = Guidance(profile, parameters, self.mission, self)
+        self.plan_ids = (0, 0, 0)
+        """Of mission, geofence and rally points; 0: there is none"""
         self._armed_at = 0.0
         self._armed_at_view = 0.0
         """The same on the plant's clock"""

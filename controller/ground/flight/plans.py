@@ -15,6 +15,7 @@ from controller.ground.flight.px4_modes import Mode
 from controller.ground.missions import mission_plan as plan
 from controller.ground.missions.legs import crossed_zones
 from controller.ground.missions.mission_plan import Fault, Item
+from controller.ground.missions.plan_id import plan_id
 from controller.ground.missions.zones import rally_points_of, zones_of
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def accept_mission(machine: Machine, items: tuple[Item, ...]) -> Fault | None:
         machine.say(INFO, text)
     _warn_of_zones(machine, items)
     machine.mission.replace(items)
+    machine.plan_ids = (plan_id(items), *machine.plan_ids[1:])
     if machine.armed and machine.mode is Mode.MISSION:
         if items:
             machine.mission.start()
@@ -54,6 +56,7 @@ def accept_fence(machine: Machine, items: tuple[Item, ...]) -> Fault | None:
     if isinstance(zones, Fault):
         return zones
     machine.guidance.zones = zones
+    machine.plan_ids = (machine.plan_ids[0], plan_id(items), machine.plan_ids[2])
     _warn_of_zones(machine, machine.mission.items)
     return None
 
@@ -64,6 +67,7 @@ def accept_rally(machine: Machine, items: tuple[Item, ...]) -> Fault | None:
     if isinstance(points, Fault):
         return points
     machine.guidance.in_flight.rally_points = points
+    machine.plan_ids = (*machine.plan_ids[:2], plan_id(items))
     return None
 
 

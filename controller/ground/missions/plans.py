@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.peers import Address
 from controller.ground.missions.mission_plan import Fault, Item
+from controller.ground.missions.plan_id import MissionAck
 from controller.ground.missions.transfer import FENCE, MISSION, RALLY, Client, Missions, Reply, Say
 
 _ALL: int = mavlink.MAV_MISSION_TYPE_ALL
@@ -37,13 +38,13 @@ class Plans:
         if kind == _ALL and message.id == mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
             faults = [plan.clear(client) for plan in self._by_kind.values()]
             result = next((f.result for f in faults if f is not None), mavlink.MAV_MISSION_ACCEPTED)
-            reply(mavlink.MAVLink_mission_ack_message(client.system, client.component, result, kind))
+            reply(MissionAck(client.system, client.component, result, kind))
         elif (plan := self._by_kind.get(kind)) is not None:
             plan.receive(message, client, now, reply, say)
         elif message.id != mavlink.MAVLINK_MSG_ID_MISSION_ACK:
             say(f"Plans of type {kind} are not supported; use 0, 1 or 2")
             result = mavlink.MAV_MISSION_UNSUPPORTED
-            reply(mavlink.MAVLink_mission_ack_message(client.system, client.component, result, kind))
+            reply(MissionAck(client.system, client.component, result, kind))
 
     def to_send(self, now: float) -> list[tuple[Client, Any, str]]:
         """As `Missions.to_send`, of every plan."""

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.link.peers import Address
 from controller.ground.missions.item_types import WITH_PLACE
 from controller.ground.missions.mission_plan import MOST_ITEMS, Fault, Item
+from controller.ground.missions.plan_id import MissionAck, MissionCount, plan_id
 from sitl_bridge.frames import DEG_E7_PER_DEG
 
 RETRY_INTERVAL = 0.25
@@ -90,7 +91,7 @@ class Missions:
         if len(self._downloads) >= MOST_TRANSFERS:
             del self._downloads[next(iter(self._downloads))]
         self._downloads[client] = items
-        reply(mavlink.MAVLink_mission_count_message(client.system, client.component, len(items), kind))
+        reply(MissionCount(client.system, client.component, len(items), kind, plan_id(items)))
 
     def _request(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         kind = message.mission_type
@@ -162,7 +163,7 @@ class Missions:
         """The last item again: our acknowledgement was lost."""
         finished = self._finished.get(client)
         if finished is not None and seq == finished[0] - 1:
-            self._ack(client, finished[1], self._kind, reply)
+            self._ack_upload(client, finished[1], reply)
 
     def _finish(self, client: Client, items: tuple[Item, ...], reply: Reply, say: Say) -> None:
         fault = self._accept(items)
@@ -174,7 +175,7 @@ class Missions:
         while len(self._finished) >= MOST_TRANSFERS:
             del self._finished[next(iter(self._finished))]
         self._finished[client] = (len(items), result)
-        self._ack(client, result, self._kind, reply)
+        self._ack_upload(client, result, reply)
 
     def _acknowledged(self, message: Any, client: Client, now: float, reply: Reply, say: Say) -> None:
         """MISSION_ACK ends a download; with anything but ACCEPTED it also takes an upload back."""
@@ -205,7 +206,12 @@ class Missions:
         reply(mavlink.MAVLink_mission_request_int_message(client.system, client.component, seq, self._kind))
 
     def _ack(self, client: Client, result: int, kind: int, reply: Reply) -> None:
-        reply(mavlink.MAVLink_mission_ack_message(client.system, client.component, result, kind))
+        reply(MissionAck(client.system, client.component, result, kind))
+
+    def _ack_upload(self, client: Client, result: int, reply: Reply) -> None:
+        """The end of an upload, with the id of the plan that it put on board."""
+        new = plan_id(self.items) if result == mavlink.MAV_MISSION_ACCEPTED else 0
+        reply(MissionAck(client.system, client.component, result, self._kind, new))
 
     # Time
 
@@ -218,9 +224,7 @@ class Missions:
                 got = f"{len(upload.items)} of {upload.count}"
                 text = f"{self._name} upload stopped at item {got}; nothing has changed"
                 cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
-                message = mavlink.MAVLink_mission_ack_message(
-                    client.system, client.component, cancelled, self._kind
-                )
+                message = MissionAck(client.system, client.component, cancelled, self._kind)
                 out.append((client, message, text))
             elif now - upload.last_request >= RETRY_INTERVAL:
                 upload.last_request = now

@@ -18,6 +18,7 @@ from controller.ground.link.packing import (
     CurrentMode,
     FigureEightStatus,
 )
+from controller.ground.missions.plan_id import MissionCurrent
 from controller.ground.telemetry import motion_messages as motion
 from controller.ground.telemetry import state_messages as state
 from controller.ground.telemetry.units import (
@@ -51,9 +52,8 @@ Builder = Callable[[Machine, VehicleView], Any]
 def _mission_current(machine: Machine) -> Any:
     flight = machine.mission
     total = len(flight.items)
-    return mavlink.MAVLink_mission_current_message(
-        flight.current, total or 0xFFFF, flight.state, 1 if machine.mode.name == "MISSION" else 2
-    )
+    flies = 1 if machine.mode is Mode.MISSION else 2
+    return MissionCurrent(flight.current, total or 0xFFFF, flight.state, flies, machine.plan_ids)
 
 
 def _current_mode(machine: Machine) -> Any:
