@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.commands.result import Verdict
 from controller.ground.flight.modes import Machine
+from controller.ground.missions.item_types import ROI
 from sitl_bridge.frames import DEG_E7_PER_DEG
 
 _UNSET_INT = 0x7FFFFFFF
@@ -44,6 +45,8 @@ WITH_PLACE = frozenset(
         mavlink.MAV_CMD_DO_ORBIT,
         mavlink.MAV_CMD_DO_FIGURE_EIGHT,
         mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        *ROI,
         mavlink.MAV_CMD_NAV_LOITER_UNLIM,
         mavlink.MAV_CMD_NAV_WAYPOINT,
     )

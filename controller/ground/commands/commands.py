@@ -12,6 +12,8 @@ from controller.ground.commands.command import WITH_PLACE, Command, Handler, Req
 from controller.ground.commands.result import UNSUPPORTED, UNSUPPORTED_FRAME, Verdict
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.px4_modes import Mode
+from controller.ground.link.packing import ProtocolVersion
+from controller.ground.missions.item_types import POINTING
 from sitl_bridge.ids import COMPONENT_LOAD, COMPONENT_WINCH
 
 _HANDLERS: dict[int, Handler] = {
@@ -23,6 +25,7 @@ _HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_DO_SET_MODE: fly.set_mode,
     mavlink.MAV_CMD_DO_SET_STANDARD_MODE: fly.set_standard_mode,
     mavlink.MAV_CMD_DO_REPOSITION: fly.reposition,
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: fly.change_altitude,
     mavlink.MAV_CMD_DO_ORBIT: fly.orbit,
     mavlink.MAV_CMD_DO_FIGURE_EIGHT: fly.figure_eight,
     mavlink.MAV_CMD_DO_GRIPPER: fly.gripper,
@@ -32,15 +35,23 @@ _HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_MISSION_START: fly.mission_start,
     mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: fly.set_item,
     mavlink.MAV_CMD_DO_SET_HOME: fly.set_home,
+    mavlink.MAV_CMD_DO_LAND_START: fly.land_start,
+    mavlink.MAV_CMD_DO_GO_AROUND: fly.go_around,
+    **dict.fromkeys(POINTING, fly.region_of_interest),
     mavlink.MAV_CMD_DO_FLIGHTTERMINATION: fly.terminate,
     mavlink.MAV_CMD_RUN_PREARM_CHECKS: serve.prearm,
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: serve.interval,
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: serve.get_interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: serve.message(),
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: serve.message(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION),
+    mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: serve.message(ProtocolVersion.id),
+    mavlink.MAV_CMD_REQUEST_FLIGHT_INFORMATION: serve.message(mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION),
+    mavlink.MAV_CMD_GET_HOME_POSITION: serve.message(mavlink.MAVLINK_MSG_ID_HOME_POSITION),
+    mavlink.MAV_CMD_DO_SET_ACTUATOR: serve.set_actuator,
     mavlink.MAV_CMD_PREFLIGHT_STORAGE: serve.storage,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: serve.reboot,
     mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: serve.calibrate,
+    mavlink.MAV_CMD_FIXED_MAG_CAL_YAW: serve.calibrate_magnetometer,
     mavlink.MAV_CMD_INJECT_FAILURE: serve.inject_failure,
 }
 _ONLY = {COMPONENT_LOAD: mavlink.MAV_CMD_DO_REPOSITION, COMPONENT_WINCH: mavlink.MAV_CMD_DO_WINCH}

@@ -10,11 +10,15 @@ from controller.ground.commands.command import Command, Handler, Requests
 from controller.ground.commands.result import OK, Verdict, deny, not_now
 from controller.ground.flight import client_requests, plans
 from controller.ground.flight.client_requests import Reposition
+from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
 from controller.ground.flight.motion.geometry import filled
 from controller.ground.flight.motion.patterns import LARGEST_RADIUS, FigureEight, Orbit, Yaw
+from controller.ground.flight.motion.region_of_interest import ITEM, LOCATION, NEXT, kind_of
 from controller.ground.flight.payload.gripper import GRIPPER_ACTIONS, HOLD
 from controller.ground.flight.px4_modes import Mode, find_mode, find_standard_mode
+from controller.ground.missions import mission_plan as plan
+from controller.ground.missions.mission_plan import RELATIVE_FRAMES
 from sitl_bridge.frames import Geodetic, Triple, yaw_from_heading
 from sitl_bridge.ids import COMPONENT_LOAD
 
@@ -23,6 +27,13 @@ FORCE = 21196.0
 DEFAULT_RADIUS = 10.0
 """m, of an orbit or figure of eight that says none"""
 _CUSTOM_MODE_ENABLED = 1
+_MODES_BY_FLAGS = (
+    (mavlink.MAV_MODE_FLAG_AUTO_ENABLED, Mode.MISSION),
+    (mavlink.MAV_MODE_FLAG_MANUAL_INPUT_ENABLED | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED, Mode.POSITION),
+)
+"""As PX4 reads a base mode without a custom one"""
+_CANCELLED = 6
+"""MAV_RESULT_CANCELLED of the current `common` dialect"""
 
 
 def arm(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -41,8 +52,13 @@ def takeoff(c: Command, machine: Machine, requests: Requests, now: float) -> Ver
 def set_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
     """DO_SET_MODE."""
     # MAVSDK and QGroundControl set other bits of the base mode too; only this one says that 2 and 3 count.
-    if not (0 <= c.p1 <= 255 and c.p1 == int(c.p1)) or not int(c.p1) & _CUSTOM_MODE_ENABLED:
+    if not (0 <= c.p1 <= 255 and c.p1 == int(c.p1)):
         return deny(f"Mode denied: param1 is {c.p1:g}; use 1 (custom mode) with PX4's main and sub mode")
+    if not int(c.p1) & _CUSTOM_MODE_ENABLED:
+        by_flags = next((m for flags, m in _MODES_BY_FLAGS if int(c.p1) & flags == flags), None)
+        if by_flags is None:
+            return deny(f"Mode denied: no mode has the flags {c.p1:g}; use 1 with PX4's main and sub mode")
+        return client_requests.set_mode(machine, by_flags, now)
     numbers = [0.0 if math.isnan(p) else p for p in (c.p2, c.p3)]
     if not all(math.isfinite(number) for number in numbers):
         return deny("Mode denied: the mode is infinite")
@@ -75,6 +91,14 @@ def reposition(c: Command, machine: Machine, requests: Requests, now: float) -> 
     speed = c.p1 if c.p1 > 0 else math.nan
     where = Reposition(c.component == COMPONENT_LOAD, (east, north, _height(c, machine)), yaw, speed)
     return client_requests.reposition(machine, where, c.p2 == 1.0)
+
+
+def change_altitude(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """DO_CHANGE_ALTITUDE: param1 in the frame of param2, above mean sea level without one, as on PX4."""
+    relative = c.p2 in RELATIVE_FRAMES
+    up = _height(c._replace(p7=c.p1, relative=relative), machine)
+    where = Reposition(False, (math.nan, math.nan, up), math.nan, math.nan)
+    return client_requests.reposition(machine, where, change_mode=True)
 
 
 def orbit(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
@@ -174,7 +198,39 @@ def mission_start(c: Command, machine: Machine, requests: Requests, now: float) 
         verdict = set_item(c, machine, requests, now)
         if not verdict.ok:
             return verdict
-    return client_requests.set_mode(machine, Mode.MISSION, now)
+    return client_requests.start_mission(machine, now)
+
+
+def land_start(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """DO_LAND_START: go on with the plan at its landing."""
+    marks = [i for i, item in enumerate(machine.mission.items) if item.command == c.number]
+    if not marks:
+        return Verdict(_CANCELLED, "Landing denied: the mission has no DO_LAND_START; use Land or Return")
+    verdict = plans.set_current_item(machine, marks[0])
+    return client_requests.start_mission(machine, now) if verdict.ok else verdict
+
+
+def go_around(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """DO_GO_AROUND: a landing is broken off; without one nothing changes, as on PX4."""
+    landing = machine.stage is Stage.DESCENT
+    return client_requests.set_mode(machine, Mode.HOLD, now) if landing else OK
+
+
+def region_of_interest(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """DO_SET_ROI and its kin: where the yaw points."""
+    kind = kind_of(c.number, c.p1)
+    if kind == LOCATION:
+        if not (math.isfinite(c.p5) and math.isfinite(c.p6)):
+            return deny("Region of interest denied: no place; send latitude and longitude")
+        place = _centre(c, machine, "Region of interest")
+        return place if isinstance(place, Verdict) else client_requests.look_at(machine, place)
+    if kind == ITEM:
+        items = machine.mission.items
+        if not (math.isfinite(c.p2) and 0 <= c.p2 < len(items) and items[int(c.p2)].has_place):
+            return deny(f"Region of interest denied: mission item {c.p2:g} is no place")
+        where = plan.place(items[int(c.p2)], machine.profile.origin, machine.home_geodetic())
+        return client_requests.look_at(machine, where)
+    return client_requests.look_at(machine, None, next_waypoint=kind == NEXT)
 
 
 def set_item(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:

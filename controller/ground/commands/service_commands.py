@@ -83,6 +83,18 @@ def calibrate(c: Command, machine: Machine, requests: Requests, now: float) -> V
     return OK
 
 
+def calibrate_magnetometer(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """FIXED_MAG_CAL_YAW: as PREFLIGHT_CALIBRATION's."""
+    only = (math.nan, 1.0, *(math.nan,) * 5)
+    return calibrate(Command(c.number, *only, False, "", c.component), machine, requests, now)
+
+
+def set_actuator(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict:
+    """DO_SET_ACTUATOR: accepted without one, as on PX4."""
+    requests.say("No servo on this vehicle: the actuator's value has no effect")
+    return OK
+
+
 def inject_failure(c: Command, machine: Machine, requests: Requests, now: float) -> Verdict | None:
     """INJECT_FAILURE."""
     if machine.parameters.integer("SYS_FAILURE_EN") != 1:

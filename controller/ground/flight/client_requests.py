@@ -136,6 +136,25 @@ def fly_pattern(machine: Machine, pattern: Pattern) -> Verdict:
     return OK
 
 
+def look_at(machine: Machine, place: Triple | None, next_waypoint: bool = False) -> Verdict:
+    """Point the yaw at a place (m ENU) or the next way-point, in Hold and missions; None: at neither."""
+    machine.mission.region.look_at(place, next_waypoint)
+    machine.guidance.in_flight.looks_at = place
+    return OK
+
+
+def start_mission(machine: Machine, now: float) -> Verdict:
+    """Fly the mission, and arm for it, as PX4 does."""
+    before = machine.mode
+    verdict = set_mode(machine, Mode.MISSION, now)
+    if not verdict.ok or machine.armed:
+        return verdict
+    verdict = machine.arm(now)
+    if not verdict.ok:
+        machine.set_mode_to(before)  # not to fly at an arming that is meant otherwise
+    return verdict
+
+
 def go_to_item(machine: Machine, item: Item, only_height: bool) -> Fault | None:
     """Fly to a way-point that is no part of a plan, or to its height only."""
     fault = plan.check((item,), machine.profile, machine.home_geodetic(), machine.guidance.fence())

@@ -60,6 +60,8 @@ class Guidance:
         """Where it holds, and heads for"""
         self.zones: tuple[Zone, ...] = ()
         """Of the geofence"""
+        self.took_off_at = math.nan
+        """s of the plant's time, when this flight left the ground; NaN: it has not"""
         self.landed_at = -math.inf
         """s of the plant's time, when the last landing was over"""
         self._profile = profile
@@ -96,7 +98,7 @@ class Guidance:
         self._ascent = self._descent = self._destination = None
         self.in_flight.end()
         self.hover.picked_up()
-        self.takeoff_height = math.nan
+        self.takeoff_height = self.took_off_at = math.nan
 
     # What is asked of it
 
@@ -147,6 +149,7 @@ class Guidance:
         self._ascent = Ascent(height, self._parameters["MPC_TKO_SPEED"], self._profile, view)
         self.hover.yaw = euler_from_quaternion(view.attitude)[2]
         self.stage = Stage.ASCENT
+        self.took_off_at = view.time
 
     def _asked_height(self, altitude: float) -> float:
         home = self.home.or_origin

@@ -33,6 +33,7 @@ from controller.ground.flight.motion.geometry import (
     stopping_point,
 )
 from controller.ground.flight.motion.patterns import Orbit, Pattern, Yaw
+from controller.ground.flight.motion.region_of_interest import heading_to
 from controller.ground.flight.motion.setpoint_types import Goto, Target
 from controller.ground.flight.motion.trajectory import motion_pole
 from controller.ground.flight.px4_modes import BY_STICKS, Mode
@@ -79,6 +80,8 @@ class InFlight:
         self.rally_points: tuple[Place, ...] = ()
         self.pattern: Pattern | None = None
         """An orbit in ORBIT, a figure of eight in HOLD"""
+        self.looks_at: Triple | None = None
+        """m ENU, where the yaw points in HOLD"""
         self.followed = FollowTarget()
         self._profile = profile
         self._parameters = parameters
@@ -96,7 +99,7 @@ class InFlight:
 
     def end(self) -> None:
         """Disarmed."""
-        self._return = self.pattern = None
+        self._return = self.pattern = self.looks_at = None
 
     def start(self, mode: Mode) -> None:
         """Begin a mode in flight, from where the vehicle holds."""
@@ -112,7 +115,9 @@ class InFlight:
         """Hold at a point of the vehicle (m; None: where it holds now); a yaw of NaN stays as it is."""
         if vehicle is not None:
             self._hover.stay_at(controlled_point(vehicle, view, self._profile), controlled_body(view))
-        self._hover.yaw = self._hover.yaw if math.isnan(yaw) else yaw
+        if not math.isnan(yaw):
+            self._hover.yaw = yaw
+            self.looks_at = self.looks_at if self._pilot.mode is Mode.MISSION else None
         self._hover.speed = speed
 
     def hold_here(self, view: VehicleView) -> None:
@@ -145,6 +150,8 @@ class InFlight:
             return self._follow_target(view)
         if self.pattern is not None or mode is Mode.ORBIT:
             return self._fly_pattern(view)
+        if mode is Mode.HOLD and self.looks_at is not None:
+            self._hover.yaw = heading_to(view.position, self.looks_at, self._hover.yaw)
         if mode not in (Mode.OFFBOARD, *BY_STICKS) or setpoint is None:
             return self.hold()
         return self._follow(setpoint, view)

@@ -90,8 +90,10 @@ class Machine:
         self.plan_ids = (0, 0, 0)
         """Of mission, geofence and rally points; 0: there is none"""
         self._armed_at = 0.0
-        self._armed_at_view = 0.0
+        self.armed_at = 0.0
         """The same on the plant's clock"""
+        self.flights = 0
+        """How often it was armed"""
 
     # What others read
 
@@ -152,7 +154,8 @@ class Machine:
 
     def _begin_flight(self, view: VehicleView, now: float) -> None:
         self.armed = True
-        self._armed_at, self._armed_at_view = now, view.time
+        self._armed_at, self.armed_at = now, view.time
+        self.flights += 1
         self.failsafes.reset()
         self.guidance.begin(view)
 
@@ -285,9 +288,9 @@ class Machine:
         if steered and self.guidance.lifts(self.offboard.latest):
             self.guidance.stage = Stage.FLYING
             return
-        landed = self.guidance.landed_at >= self._armed_at_view
+        landed = self.guidance.landed_at >= self.armed_at
         name = "COM_DISARM_LAND" if landed else "COM_DISARM_PRFLT"
-        since = self.guidance.landed_at if landed else self._armed_at_view
+        since = self.guidance.landed_at if landed else self.armed_at
         limit = self.parameters[name]
         if 0 <= limit < view.time - since:
             reason = "landed" if landed else f"no take-off within {limit:g} s ({name})"

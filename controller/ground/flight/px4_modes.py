@@ -59,6 +59,8 @@ class Mode(Enum):
 BY_STICKS = (Mode.POSITION, Mode.ALTITUDE)
 SELECTABLE = tuple(mode for mode in Mode if mode is not Mode.TERMINATION)
 _BY_NUMBER = {(mode.value.main, mode.value.sub): mode for mode in SELECTABLE}
+# What else PX4 has: AUTO without a sub-mode, a landing on a beacon that is not there, slow sticks.
+_BY_NUMBER |= {(4, 0): Mode.MISSION, (4, 9): Mode.LAND, (3, 2): Mode.POSITION}
 _BY_STANDARD = {mode.standard_mode: mode for mode in SELECTABLE if mode.standard_mode}
 _ELSEWHERE = {
     1: "Manual",

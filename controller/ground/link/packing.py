@@ -81,6 +81,22 @@ class FigureEightStatus(mavlink.MAVLink_message):  # type: ignore[misc]
         return bytes(self._pack(mav, self.crc_extra, self._layout.pack(*self._fields), force_mavlink1))
 
 
+class ProtocolVersion(mavlink.MAVLink_message):  # type: ignore[misc]
+    """PROTOCOL_VERSION (300), which older clients ask for: MAVLink 1 is heard, 2 is spoken."""
+
+    id = 300
+    crc_extra = 217
+    _layout = struct.Struct("<HHH8s8s")
+
+    def __init__(self) -> None:
+        super().__init__(self.id, "PROTOCOL_VERSION")
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        """As pymavlink's generated messages do."""
+        payload = self._layout.pack(200, 100, 200, b"", b"")
+        return bytes(self._pack(mav, self.crc_extra, payload, force_mavlink1))
+
+
 class ComponentMetadata(mavlink.MAVLink_message):  # type: ignore[misc]
     """COMPONENT_METADATA (397) of the current `common` dialect: where the general metadata file is."""
 

@@ -64,7 +64,7 @@ class Item(NamedTuple):
     @property
     def names_place(self) -> bool:
         """Whether x, y and z are a place of any meaning."""
-        if self.command == ROI:
+        if self.command in ROI:
             return self.p1 == _LOCATION
         if self.command == SET_HOME:
             return self.p1 != 1
@@ -169,9 +169,9 @@ def _check_numbers(item: Item, count: int) -> Fault | None:
         return Fault(second, f"speed {p2:g} m/s; use 0 to {LARGEST_SPEED:g}, or -1 for no change")
     if item.command in DELAYS and not p1 >= 0:
         return Fault(first, "delay until a time of day is not supported; use seconds")
-    if item.command == ROI and p1 not in (0, 1, 2, _LOCATION, 4):
+    if item.command in ROI and p1 not in (0, 1, 2, _LOCATION, 4):
         return Fault(first, f"region of interest of kind {p1:g}; use 0 to 4")
-    if item.command == ROI and p1 == 2 and not (0 <= p2 < count and p2 == int(p2)):
+    if item.command in ROI and p1 == 2 and not (0 <= p2 < count and p2 == int(p2)):
         return Fault(second, f"region of interest at item {p2:g} of {count}")
     return None
 

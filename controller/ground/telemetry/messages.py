@@ -17,6 +17,7 @@ from controller.ground.link.packing import (
     ComponentMetadata,
     CurrentMode,
     FigureEightStatus,
+    ProtocolVersion,
 )
 from controller.ground.missions.plan_id import MissionCurrent
 from controller.ground.telemetry import motion_messages as motion
@@ -73,6 +74,7 @@ BUILDERS: dict[int, Builder] = {
     mavlink.MAVLINK_MSG_ID_VFR_HUD: motion.vfr_hud,
     mavlink.MAVLINK_MSG_ID_SYS_STATUS: state.sys_status,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: state.extended_sys_state,
+    mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION: state.flight_information,
     mavlink.MAVLINK_MSG_ID_ALTITUDE: motion.altitude,
     mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: state.battery_status,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION: motion.home_position,
@@ -89,6 +91,8 @@ def build(message_id: int, machine: Machine) -> Any:
     """A message as it is now; None if there is none of this number, or nothing to say in it yet."""
     if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
         return heartbeat(machine)
+    if message_id == ProtocolVersion.id:
+        return ProtocolVersion()
     if message_id == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
         return autopilot_version(machine)
     if message_id in (ComponentMetadata.id, ComponentInformation.id):

@@ -109,6 +109,13 @@ def extended_sys_state(machine: Machine, view: VehicleView) -> Any:
     return mavlink.MAVLink_extended_sys_state_message(0, landed_state(machine, view))
 
 
+def flight_information(machine: Machine, view: VehicleView) -> Any:
+    """FLIGHT_INFORMATION: times since the autopilot's start, us; 0: not yet."""
+    armed_at = machine.armed_at if machine.armed else math.nan
+    times = (0 if math.isnan(t) else round(t * 1e6) for t in (armed_at, machine.guidance.took_off_at))
+    return mavlink.MAVLink_flight_information_message(milliseconds(view), *times, machine.flights)
+
+
 def cell_voltages(pack: float, cells: int) -> tuple[list[int], list[int]]:
     """BATTERY_STATUS.voltages and .voltages_ext, mV, of a pack (V, NaN: not known) that is shared evenly."""
     if not math.isfinite(pack):

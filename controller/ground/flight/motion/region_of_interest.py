@@ -11,9 +11,14 @@ from sitl_bridge.frames import Triple
 
 _CLOSE = 0.5
 """m, horizontally, within which a place gives no heading"""
-_NEXT, _ITEM, _LOCATION = 1, 2, 3
+NEXT, ITEM, LOCATION = 1, 2, 3
 """DO_SET_ROI's param1"""
-_KINDS = {ROI_LOCATION: _LOCATION, ROI_NEXT: _NEXT}
+_KINDS = {ROI_LOCATION: LOCATION, ROI_NEXT: NEXT}
+
+
+def kind_of(command: int, p1: float) -> float | None:
+    """What a command or item of the family looks at, as DO_SET_ROI's param1; None or 0: nothing."""
+    return p1 if command in ROI else _KINDS.get(command)
 
 
 class RegionOfInterest:
@@ -25,19 +30,25 @@ class RegionOfInterest:
 
     def point_at(self, item: Item, items: tuple[Item, ...], place: Callable[[Item], Triple]) -> None:
         """Look where a DO_SET_ROI item says; any other kind than these ends it."""
-        kind = (
-            item.p1 if item.command == ROI else {ROI_LOCATION: _LOCATION, ROI_NEXT: _NEXT}.get(item.command)
-        )
-        self._place, self._next = None, kind == _NEXT
-        if kind == _LOCATION:
-            self._place = place(item)
-        elif kind == _ITEM and items[int(item.p2)].has_place:
-            self._place = place(items[int(item.p2)])
+        kind = kind_of(item.command, item.p1)
+        if kind == LOCATION:
+            self.look_at(place(item))
+        elif kind == ITEM and items[int(item.p2)].has_place:
+            self.look_at(place(items[int(item.p2)]))
+        else:
+            self.look_at(None, next_waypoint=kind == NEXT)
+
+    def look_at(self, place: Triple | None, next_waypoint: bool = False) -> None:
+        """Look at a place, m ENU, or at the way-point that is flown to; at nothing without either."""
+        self._place, self._next = place, next_waypoint
 
     def yaw(self, here: Triple, waypoint: Triple | None) -> float:
         """Heading towards it, rad ENU, from a position of the vehicle, m; NaN: as it is."""
         there = waypoint if self._next else self._place
-        if there is None:
-            return math.nan
-        east, north = there[0] - here[0], there[1] - here[1]
-        return math.nan if math.hypot(east, north) < _CLOSE else math.atan2(north, east)
+        return math.nan if there is None else heading_to(here, there, math.nan)
+
+
+def heading_to(here: Triple, there: Triple, default: float) -> float:
+    """Heading from a place to another (m), rad ENU; the default where they are too close for one."""
+    east, north = there[0] - here[0], there[1] - here[1]
+    return default if math.hypot(east, north) < _CLOSE else math.atan2(north, east)
