@@ -27,7 +27,14 @@ from controller.ground.link.datagrams import DatagramSplitter
 from controller.ground.link.outbox import Outbox
 from controller.ground.link.packing import CurrentMode, Packed, decoded, packed
 from controller.ground.link.peers import Address, Peers
-from controller.ground.link.ports import ONBOARD_LOCAL, ONBOARD_PEER, STATION_LOCAL, STATION_PEER
+from controller.ground.link.ports import (
+    ONBOARD_LINK,
+    ONBOARD_LOCAL,
+    ONBOARD_PEER,
+    STATION_LINK,
+    STATION_LOCAL,
+    STATION_PEER,
+)
 from controller.ground.link.signing import Signing
 from controller.ground.missions.plans import Plans
 from controller.ground.parameters.file import ParameterFile
@@ -41,7 +48,6 @@ from controller.ground.telemetry.plant_clock import PlantClock
 from controller.ground.telemetry.vehicle_state import Profile, VehicleView
 from sitl_bridge.mavlink.framing import FLAG_SIGNED, Frame
 
-STATION_LINK, ONBOARD_LINK = 0, 1
 GUIDANCE_PERIOD = 0.02
 """s, at most, between two looks of the mode machine at the vehicle"""
 _HOUSEKEEPING = 1.0
@@ -238,7 +244,7 @@ class Station:
             self._commands.restart = ""
             self.machine.restart()
             for peer in self.peers:
-                peer.streams = Streams(now)
+                peer.streams = Streams(now, onboard=peer.address.link == ONBOARD_LINK)
 
     def _state(self) -> tuple[bool, Mode, Stage]:
         return self.machine.armed, self.machine.mode, self.machine.stage

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as dialect
 from controller.ground.inbox import HANDLERS, NOT_FLOWN
 from controller.ground.link.packing import CurrentMode, FigureEightStatus
 from controller.ground.missions.transfer import MESSAGES as MISSION_MESSAGES
-from controller.ground.telemetry.message_rates import DEFAULT_RATES, ON_REQUEST
+from controller.ground.telemetry.message_rates import DEFAULT_RATES, ON_REQUEST, ONBOARD_RATES
 from sitl.reference_pages.tables import page, table
 
 LATER = {CurrentMode.id: "CURRENT_MODE", FigureEightStatus.id: "FIGURE_EIGHT_EXECUTION_STATUS"}
@@ -49,8 +49,10 @@ ABOUT = "https://mavlink.io/en/messages/common.html"
 def markdown() -> str:
     """The page."""
     ground_sent = _constructed("controller", "ground")
-    replies = ground_sent - set(DEFAULT_RATES) - set(ON_REQUEST) - {dialect.MAVLINK_MSG_ID_COMMAND_LONG}
+    unasked = DEFAULT_RATES | ONBOARD_RATES
+    replies = ground_sent - set(unasked) - set(ON_REQUEST) - {dialect.MAVLINK_MSG_ID_COMMAND_LONG}
     rates = [(number, f"{rate:g} Hz") for number, rate in DEFAULT_RATES.items()]
+    rates += [(number, f"{rate:g} Hz, to companions") for number, rate in ONBOARD_RATES.items()]
     asked = [(number, "SET_MESSAGE_INTERVAL, REQUEST_MESSAGE") for number in ON_REQUEST]
     taken = [(number, "acted on") for number in {*HANDLERS, *MISSION_MESSAGES} - set(NOT_FLOWN)]
     declined = [(number, NOT_FLOWN[number]) for number in NOT_FLOWN]

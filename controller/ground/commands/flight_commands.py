@@ -198,6 +198,11 @@ def mission_start(c: Command, machine: Machine, requests: Requests, now: float) 
         verdict = set_item(c, machine, requests, now)
         if not verdict.ok:
             return verdict
+    known = math.isfinite(
+        c.p1
+    )  # without an item PX4 denies it; here it is a change of mode, and arms nothing
+    if not known and not machine.armed:
+        return client_requests.set_mode(machine, Mode.MISSION, now)
     return client_requests.start_mission(machine, now)
 
 

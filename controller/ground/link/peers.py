@@ -9,6 +9,7 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.ground.link.packing import Packed, frame, frame_v1
+from controller.ground.link.ports import ONBOARD_LINK
 from controller.ground.link.signing import Signing
 from controller.ground.telemetry.message_rates import Streams
 from sitl_bridge.mavlink.framing import Frame
@@ -28,6 +29,7 @@ class Address(NamedTuple):
     """Where a peer is: one of our links (0: ground stations, 1: onboard) and its own host and port."""
 
     link: int
+    """STATION_LINK or ONBOARD_LINK"""
     host: str
     port: int
 
@@ -48,7 +50,7 @@ class Peer:
         """Whether it has sent a HEARTBEAT, as every lasting client does"""
         self.version = 0
         """Largest MAVLink version heard; 0 until then, which is answered in version 2."""
-        self.streams = Streams(now)
+        self.streams = Streams(now, onboard=self.address.link == ONBOARD_LINK)
         self.queue: deque[bytes] = deque(maxlen=LONGEST_QUEUE)
         self.sequences: dict[tuple[int, int], int] = {}
         self.text_id = 0

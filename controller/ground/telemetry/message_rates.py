@@ -37,18 +37,60 @@ DEFAULT_RATES: dict[int, float] = {
     FigureEightStatus.id: 2.0,
     mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE: 1.0,
     mavlink.MAVLINK_MSG_ID_WINCH_STATUS: 2.0,
+    mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: 2.0,
+    mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 1.0,
+    mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 1.0,
+    mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 1.0,
+    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
 }
 """Hz, of each message that is sent unasked. PX4's 50 Hz makes clients on a busy machine drop some."""
 
+ONBOARD_RATES: dict[int, float] = {
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: 10.0,
+    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: 10.0,
+    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+}
+"""Hz, of what goes to companions unasked besides: as on PX4, whose scripts wait for it"""
+
 ON_REQUEST = (
-    mavlink.MAVLINK_MSG_ID_ODOMETRY,
-    mavlink.MAVLINK_MSG_ID_HIGHRES_IMU,
-    mavlink.MAVLINK_MSG_ID_SYSTEM_TIME,
-    mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+    mavlink.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS,
+    mavlink.MAVLINK_MSG_ID_FLIGHT_INFORMATION,
 )
 """Messages that can be streamed and are not unless asked for."""
 
-STREAMABLE = (*DEFAULT_RATES, *ON_REQUEST)
+STREAMABLE = (*DEFAULT_RATES, *ONBOARD_RATES, *ON_REQUEST)
+
+WITHOUT_DATA = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED,
+        mavlink.MAVLINK_MSG_ID_CAMERA_TRIGGER,
+        mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        mavlink.MAVLINK_MSG_ID_EFI_STATUS,
+        290,  # ESC_INFO and ESC_STATUS of the current `common` dialect
+        291,
+        mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS,
+        mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS,
+        mavlink.MAVLINK_MSG_ID_GPS2_RAW,
+        mavlink.MAVLINK_MSG_ID_GPS_STATUS,
+        mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+        mavlink.MAVLINK_MSG_ID_MOUNT_ORIENTATION,
+        mavlink.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+        mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE,
+        mavlink.MAVLINK_MSG_ID_OPTICAL_FLOW_RAD,
+        mavlink.MAVLINK_MSG_ID_RAW_RPM,
+        mavlink.MAVLINK_MSG_ID_RC_CHANNELS,
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU,
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU2,
+        mavlink.MAVLINK_MSG_ID_SCALED_IMU3,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE2,
+        mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE3,
+        mavlink.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION,
+        mavlink.MAVLINK_MSG_ID_VIBRATION,
+        mavlink.MAVLINK_MSG_ID_WIND_COV,
+    )
+)
+"""What PX4 streams of sensors that are not here: any rate is taken, as on a PX4 without them"""
 
 _GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_RAW_SENSORS: (mavlink.MAVLINK_MSG_ID_HIGHRES_IMU,),
@@ -71,15 +113,20 @@ _GROUPS: dict[int, tuple[int, ...]] = {
     mavlink.MAV_DATA_STREAM_EXTRA3: (mavlink.MAVLINK_MSG_ID_HOME_POSITION,),
 }
 _GROUPS[mavlink.MAV_DATA_STREAM_ALL] = tuple(
-    message_id for group in list(_GROUPS.values()) for message_id in group if message_id in DEFAULT_RATES
+    message_id
+    for group in list(_GROUPS.values())
+    for message_id in group
+    if message_id in DEFAULT_RATES | ONBOARD_RATES
 )
 
 
 class Streams:
     """The schedule of one peer."""
 
-    def __init__(self, now: float) -> None:
-        self._intervals = {message_id: 1.0 / rate for message_id, rate in DEFAULT_RATES.items()}
+    def __init__(self, now: float, onboard: bool = False) -> None:
+        """onboard: to a companion, by the link for them."""
+        self._defaults = DEFAULT_RATES | ONBOARD_RATES if onboard else DEFAULT_RATES
+        self._intervals = {message_id: 1.0 / rate for message_id, rate in self._defaults.items()}
         # HEARTBEAT first; the others spread out, so that no tick of the control loop has to build them all.
         spread = SPREAD / len(self._intervals)
         self._due = {message_id: now + index * spread for index, message_id in enumerate(self._intervals)}
@@ -92,12 +139,14 @@ class Streams:
 
     def set_interval(self, message_id: float, microseconds: float, now: float) -> Verdict:
         """MAV_CMD_SET_MESSAGE_INTERVAL: 0 or unset is the default rate, -1 off."""
+        if message_id in WITHOUT_DATA:
+            return OK
         if message_id not in STREAMABLE:
             return deny(
                 f"Message {message_id:g} cannot be streamed; docs/ground-control.md lists those that can"
             )
         number = int(message_id)
-        default = DEFAULT_RATES.get(number)
+        default = self._defaults.get(number)
         if math.isnan(microseconds) or microseconds == 0:
             self._set(number, 1.0 / default if default else None, now)
         elif microseconds == -1:

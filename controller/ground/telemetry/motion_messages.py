@@ -10,8 +10,9 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.ground.commands.setpoints import NOTHING
 from controller.ground.flight.guidance import Stage
 from controller.ground.flight.modes import Machine
+from controller.ground.flight.motion.geometry import filled
 from controller.ground.flight.motion.patterns import FigureEight, Orbit
-from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto, Land
+from controller.ground.flight.motion.setpoint_types import Attitude, Body, Follow, Goto, Land
 from controller.ground.link.packing import (
     FigureEightStatus,
 )
@@ -130,6 +131,32 @@ def position_target(machine: Machine, view: VehicleView) -> Any:
     return mavlink.MAVLink_position_target_local_ned_message(
         milliseconds(view), mavlink.MAV_FRAME_LOCAL_NED, mask, *fields, heading, -rate
     )
+
+
+def position_target_global(machine: Machine, view: VehicleView) -> Any:
+    """POSITION_TARGET_GLOBAL_INT: the local target, its place in degrees above mean sea level."""
+    local = position_target(machine, view)
+    if local is None:
+        return None
+    at = enu_to_ned((local.x, local.y, local.z))  # its own inverse
+    x, y, altitude = place(machine, filled(at, view.position))
+    height = math.nan if math.isnan(at[2]) else altitude / MILLIMETRES_PER_METRE
+    rates = (local.vx, local.vy, local.vz, local.afx, local.afy, local.afz, local.yaw, local.yaw_rate)
+    return mavlink.MAVLink_position_target_global_int_message(
+        milliseconds(view), mavlink.MAV_FRAME_GLOBAL_INT, local.type_mask, x, y, height, *rates
+    )
+
+
+def attitude_target(machine: Machine, view: VehicleView) -> Any:
+    """ATTITUDE_TARGET: what a client asks for; other targets have positions."""
+    target = machine.target
+    if not isinstance(target, Attitude):
+        return None
+    rates = flu_to_frd(target.body_rates)
+    mask = sum(1 << bit for bit, rate in enumerate(rates) if math.isnan(rate))
+    mask |= (1 << 7) * (target.attitude is None)
+    q = attitude_to_ned_frd(view.attitude if target.attitude is None else target.attitude)
+    return mavlink.MAVLink_attitude_target_message(milliseconds(view), mask, q, *rates, target.thrust)
 
 
 def odometry(machine: Machine, view: VehicleView) -> Any:

@@ -33,6 +33,10 @@ from sitl_bridge.mavlink.fields import (
     whole,
 )
 
+_PULSE, _PULSE_RANGE = 1000.0, 1000.0
+"""us: the pulse of a rotor that stands, and how much longer it is at full speed"""
+_SERVOS, _ACTUATORS = 16, 32
+"""That the messages have room for"""
 _HEALTH_BITS = (
     (mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO, "gyroscope"),
     (mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, "accelerometer"),
@@ -114,6 +118,21 @@ def flight_information(machine: Machine, view: VehicleView) -> Any:
     armed_at = machine.armed_at if machine.armed else math.nan
     times = (0 if math.isnan(t) else round(t * 1e6) for t in (armed_at, machine.guidance.took_off_at))
     return mavlink.MAVLink_flight_information_message(milliseconds(view), *times, machine.flights)
+
+
+def servo_output(machine: Machine, view: VehicleView) -> Any:
+    """SERVO_OUTPUT_RAW: the rotors' commands as pulses; none without."""
+    pulses = [round(_PULSE + _PULSE_RANGE * min(max(u, 0.0), 1.0)) for u in view.rotors[:_SERVOS]]
+    first = pulses[:8] + [0] * (8 - len(pulses))
+    further = pulses[8:] + [0] * (8 - len(pulses[8:]))
+    return mavlink.MAVLink_servo_output_raw_message(microseconds(view) & 0xFFFFFFFF, 0, *first, *further)
+
+
+def actuator_output(machine: Machine, view: VehicleView) -> Any:
+    """ACTUATOR_OUTPUT_STATUS: the rotors' commands, 0..1."""
+    values = list(view.rotors[:_ACTUATORS])
+    padded = values + [0.0] * (_ACTUATORS - len(values))
+    return mavlink.MAVLink_actuator_output_status_message(microseconds(view), len(values), padded)
 
 
 def cell_voltages(pack: float, cells: int) -> tuple[list[int], list[int]]:

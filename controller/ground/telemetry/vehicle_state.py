@@ -145,6 +145,8 @@ class VehicleView:
     """s since the last HIL_SENSOR; inf before the first"""
     throttle: float = 0.0
     """collective, 0..1"""
+    rotors: tuple[float, ...] = ()
+    """Command of each rotor, 0..1; empty: disarmed"""
     battery_voltage: float = math.nan
     """V"""
     battery_current: float = math.nan

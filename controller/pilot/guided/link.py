@@ -6,10 +6,11 @@ import time
 from collections.abc import Callable
 
 from controller.ground.link.peers import Address
+from controller.ground.link.ports import ONBOARD_LINK, STATION_LINK
 from controller.ground.link.signing import Signing, read_key
 from controller.ground.link.sockets import GroundSockets
 from controller.ground.parameters.file import ParameterFile
-from controller.ground.station import ONBOARD_LINK, STATION_LINK, Station, local_ports, standard_peers
+from controller.ground.station import Station, local_ports, standard_peers
 from controller.ground.telemetry.vehicle_state import profile_of
 from controller.pilot.guided.log_folder import LogFolder
 from controller.pilot.guided.options import GroundOptions, Ports

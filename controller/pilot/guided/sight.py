@@ -59,7 +59,8 @@ class Sight:
         view.attitude, view.body_rates = attitude, (x[12], x[13], x[14])
         view.acceleration = tuple(self._accelerometer.tolist())
         view.hil_age = 0.0
-        view.throttle = sum(self._rotors.tolist()) / len(self._rotors) if armed else 0.0
+        view.rotors = tuple(self._rotors.tolist()) if armed else ()
+        view.throttle = sum(view.rotors) / len(view.rotors) if view.rotors else 0.0
         return view, self._assessor.contact(estimate)
 
     def touch(self, contact: Contact) -> None:

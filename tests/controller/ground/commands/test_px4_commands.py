@@ -33,6 +33,14 @@ def test_mission_start_arms_and_flies() -> None:
     rig.run_until(lambda: "Mission finished; holding" in client.texts(), 200.0)
 
 
+def test_mission_start_without_an_item_does_not_arm() -> None:
+    rig, client = ready()
+    assert Uploader(client, SQUARE).run() == 0
+    assert client.command(300, NAN).result == ACCEPTED
+    assert not rig.station.armed
+    assert mode(rig) == "MISSION"
+
+
 def test_mission_start_that_cannot_arm_says_why_and_leaves_the_mode() -> None:
     rig, client = ready()
     assert Uploader(client, SQUARE).run() == 0
