@@ -118,6 +118,8 @@ def test_the_global_origin_is_told_and_stays() -> None:
     rig = Rig()
     client = rig.client()
     rig.run(0.1)
+    client.command(511, 49, -1)  # its stream off
+    client.clear()
     place = (round(ZURICH[0] * 1e7), round(ZURICH[1] * 1e7))
     client.send(mavlink.MAVLink_set_gps_global_origin_message(1, *place, 488_000))
     rig.run(0.04)
