@@ -261,7 +261,8 @@ def _fly_into(options: FlightOptions, out: Path, vehicle: Vehicle, stop: StopReq
         load = np.array(event["load_m"])
         began = event.pop("legs_began_s", [])
         target = reference_positions(as_flown(reference[0], began), np.array([event["time_s"]]))[0]
-        event["mode"] = scenario.reference.kind
+        count = len(reference[0])
+        event["mode"] = scenario.reference.kind if count == 1 else f"to point {len(began) or 1} of {count}"
         return status_of(event, float(np.linalg.norm(load - target)))
 
     with Display() as display:

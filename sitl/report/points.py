@@ -86,4 +86,4 @@ def unset(points: Sequence[PointMetrics] | None) -> str | None:
     reached = [point for point in points or () if point["set_at_s"] is not None]
     if points is None or len(reached) == len(points):
         return None
-    return f"it was over on the way to point {len(reached)} of {len(points)}"
+    return f"it was over before point {len(reached) + 1} of {len(points)} was set"

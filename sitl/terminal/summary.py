@@ -82,8 +82,9 @@ def _points(points: list[dict[str, Any]]) -> str:
     if not points:
         return ""
     worst = max(point["overshoot_pct"] or 0.0 for point in points)
-    last = points[-1]["set_at_s"]
-    return f"{len(points)}, the last one set at {last:.2f} s; overshoot up to {worst:.1f} %; at the last one:"
+    began = [point["set_at_s"] for point in points if point["set_at_s"] is not None]
+    counted = f"figures below count from {began[-1]:.2f} s on"
+    return f"{len(began)} of {len(points)} set, overshoot up to {worst:.1f} %; {counted}"
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

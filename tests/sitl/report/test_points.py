@@ -64,10 +64,10 @@ def test_a_point_that_was_not_set_is_said() -> None:
     found = path_metrics(flown, TIMES, settled)
     assert not found["settled"]
     assert found["points"][1]["set_at_s"] is None
-    assert unset(found["points"]) == "it was over on the way to point 1 of 2"
+    assert unset(found["points"]) == "it was over before point 2 of 2 was set"
     outcome = judge(hovering(), np.tile((0.0, 0.0, 10.0), (1000, 1)), IRIS, {**FACTS, **found})
     assert outcome.outcome == "did not settle"
-    assert outcome.outcome_cause == "it was over on the way to point 1 of 2"
+    assert outcome.outcome_cause == "it was over before point 2 of 2 was set"
 
 
 def test_a_far_point_is_no_running_away() -> None:

@@ -81,6 +81,17 @@ def test_the_table_says_how_near_the_sensors_let_a_load_settle() -> None:
     assert "within" not in table({**near, "settled_tolerance_m": 0.3})
 
 
+def test_the_table_says_which_point_of_a_sequence_its_figures_are_for() -> None:
+    points = [
+        {"set_at_s": 0.0, "overshoot_pct": 3.14},
+        {"set_at_s": 5.5, "overshoot_pct": None},
+        {"set_at_s": None, "overshoot_pct": None},
+    ]
+    shown = table({"settled": False, "outcome": "did not settle", "points": points})
+    assert "2 of 3 set, overshoot up to 3.1 %; figures below count from 5.50 s on" in shown
+    assert "overshoot up to" not in table({"settled": True, "points": None})
+
+
 def test_the_table_is_as_narrow_as_the_terminal() -> None:
     summary = {"settled": False, "outcome": "did not settle", "outcome_cause": "up to 1.36 m off " * 3}
     assert max(map(len, table(summary, 40).splitlines())) <= 40
