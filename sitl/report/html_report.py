@@ -22,13 +22,13 @@ LOAD = 3
 """Row of the load's position in the covariance of the estimate."""
 _COLOURS = {"x": "#d62728", "y": "#2ca02c", "z": "#1f77b4"}
 LOAD_PANEL = "load and set-point [m]"
-DISTANCE = "load's distance from its set-point [m]"
+DISTANCE = "load from set-point [m]"
 ANGLES = "swing and tilt [°]"
 TENSION = "cable tension [N]"
-ROTORS = "rotors, share of the largest speed"
+ROTORS = "rotors, share of<br>the largest speed"
 _TERM_PANELS = {
-    "thrust, term by term [N]": {"": "thrust_N"},
-    "moments, term by term [N m]": {" about x": "moment_x_N_m", " about y": "moment_y_N_m"},
+    "thrust by term [N]": {"": "thrust_N"},
+    "moments by term [N m]": {" about x": "moment_x_N_m", " about y": "moment_y_N_m"},
 }
 """Of flights whose law tells its terms: what is drawn of them."""
 MOST_TERM_POINTS = 500
@@ -94,7 +94,7 @@ def _figure(recording: Recording) -> dict[str, Any]:
         panel = panels.index(title) + 1
         axis = "" if panel == 1 else str(panel)
         trace = _points(x, y) | {"name": name, "type": "scatter", "mode": "lines"}
-        traces.append({**trace, "xaxis": "x", "yaxis": f"y{axis}", "legendgroup": str(panel), **style})
+        traces.append({**trace, "xaxis": "x", "yaxis": f"y{axis}", "legend": f"legend{axis}", **style})
 
     for index, letter in enumerate("xyz"):
         colour = _COLOURS[letter]
@@ -143,7 +143,7 @@ def _add_terms(traces: list[dict[str, Any]], recording: Recording, panels: Seque
                 "width": 1,
                 "dash": "dot" if about == " about y" else "solid",
             }
-            trace = {"type": "scatter", "mode": "lines", "legendgroup": str(panel), "line": style}
+            trace = {"type": "scatter", "mode": "lines", "legend": f"legend{panel}", "line": style}
             traces.append(
                 {**trace, **_points(x, y, 4), "name": term + about, "xaxis": "x", "yaxis": f"y{panel}"}
             )
@@ -154,7 +154,7 @@ def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, c
     estimates = recording.estimates
     if estimates is None:
         return
-    common = {"type": "scatter", "mode": "lines", "yaxis": "y", "legendgroup": "1"}
+    common = {"type": "scatter", "mode": "lines", "yaxis": "y", "legend": "legend"}
     x, y = envelope(estimates["time_s"], estimates[f"load_{letter}_m"])
     dotted = {"color": colour, "width": 1, "dash": "dot"}
     traces.append({**common, **_points(x, y), "name": f"{letter}, estimated", "line": dotted})
@@ -170,14 +170,13 @@ def _add_band(traces: list[dict[str, Any]], recording: Recording, letter: str, c
 
 
 def _layout(recording: Recording, panels: Sequence[str]) -> dict[str, Any]:
-    """Panels below each other on one time axis; slack stretches shaded."""
+    """Panels below each other on one time axis, each with its legend; slack stretches shaded."""
     gap = 0.03
     height = (1.0 - gap * (len(panels) - 1)) / len(panels)
     layout: dict[str, Any] = {
         "height": 230 * len(panels),
         "margin": {"l": 70, "r": 20, "t": 60, "b": 50},
         "hovermode": "x unified",
-        "legend": {"traceorder": "grouped"},
         "xaxis": {"title": {"text": "time [s]"}, "anchor": f"y{len(panels)}"},
         "shapes": [
             *_shading(slack_spans(recording.times, recording.states["cable_tension_N"])),
@@ -188,7 +187,9 @@ def _layout(recording: Recording, panels: Sequence[str]) -> dict[str, Any]:
     for index, title in enumerate(panels):
         top = 1.0 - index * (height + gap)
         axis = {"domain": [top - height, top], "title": {"text": title}}
-        layout["yaxis" if index == 0 else f"yaxis{index + 1}"] = axis
+        number = "" if index == 0 else str(index + 1)
+        layout[f"yaxis{number}"] = axis
+        layout[f"legend{number}"] = {"y": top, "yanchor": "top", "font": {"size": 11}}
     return layout
 
 

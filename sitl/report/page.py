@@ -24,7 +24,7 @@ MOST_EVENTS = 500
 
 
 def said(summary: dict[str, Any]) -> str:
-    """How the flight ended and how the link did, in a sentence each."""
+    """Outcome, clock and link, in a short sentence each."""
     outcome = ", ".join(str(summary[key]) for key in ("outcome", "outcome_cause") if summary.get(key))
     ticks = [
         f"{summary[key]} ticks {what}"
@@ -37,7 +37,7 @@ def said(summary: dict[str, Any]) -> str:
     ]
     link = ", ".join(ticks) or "no tick late, sent again, or without an answer"
     clock = f"{summary.get('clock')} at {summary.get('rate_hz'):g} Hz" if summary.get("rate_hz") else ""
-    return f"{outcome or 'no outcome'}. Link: {clock}{': ' if clock else ''}{link}."
+    return f"Outcome: {outcome or 'not known'}. {f'Clock: {clock}. ' if clock else ''}Link: {link}."
 
 
 def _facts(summary: dict[str, Any]) -> str:
@@ -101,8 +101,8 @@ th {{ text-align: left; font-weight: 500; padding-right: 1.5em; }}
 <body>
 <h1>{title}</h1>
 <p>{said}</p>
-<p>Grey stretches: the cable is slack. Dotted across: flight modes and faults.
-Dashed beside the rotors' speeds: the largest.
+<p>Where the plots are grey the cable is slack. A dotted line across all plots marks a flight mode or a fault.
+The dashed line in the rotors' plot is their largest speed.
 Click a name to hide its line, drag to zoom, double-click to go back.</p>
 <div id="figure"></div>
 <details open><summary>What happened, and what was said</summary><table class="events">

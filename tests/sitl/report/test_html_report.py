@@ -62,9 +62,12 @@ def test_the_page_is_self_contained_and_its_data_is_the_flight(tmp_path: Path) -
     assert not re.search(r'(src|href)="', text)
     data = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)
     assert data is not None
-    traces = {
-        trace["name"]: trace for trace in json.loads(gzip.decompress(base64.b64decode(data[1])))["data"]
-    }
+    figure = json.loads(gzip.decompress(base64.b64decode(data[1])))
+    traces = {trace["name"]: trace for trace in figure["data"]}
+    layout = figure["layout"]
+    for trace in figure["data"]:  # each line is named beside its own panel
+        top = layout[trace["yaxis"].replace("y", "yaxis")]["domain"][1]
+        assert layout[trace["legend"]]["y"] == top
     assert max(traces["x of the load"]["y"]) == pytest.approx(recording.states["load_x_m"].max(), rel=1e-5)
     assert {f"rotor {n}" for n in range(1, 5)} < set(traces)
     assert set(traces["saturated about y"]["y"]) == {18.0}
@@ -115,7 +118,8 @@ def test_how_it_ended_is_said_in_words() -> None:
         "rate_hz": 250.0,
     }
     assert said(summary) == (
-        "did not settle, 0.4 m off. Link: lockstep at 250 Hz: no tick late, sent again, or without an answer."
+        "Outcome: did not settle, 0.4 m off. Clock: lockstep at 250 Hz. "
+        "Link: no tick late, sent again, or without an answer."
     )
     assert "3 ticks sent again" in said({**summary, "resent_ticks": 3, "late_ticks": 0})
-    assert said({}).startswith("no outcome")
+    assert said({}) == "Outcome: not known. Link: no tick late, sent again, or without an answer."
