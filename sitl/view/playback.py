@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sitl.view.page.panel import Panel, aim
+from sitl.view.page.panel import Panel, overview
 from sitl.view.page.scene import Scene
 from sitl.view.view import View
 from sitl_bridge.process import StopRequest
@@ -44,7 +44,7 @@ def export_html(views: list[View], vehicle: Vehicle, server: Any, file: Path) ->
     """Write the flight as one self-contained page with a time line."""
     scene = Scene(server, vehicle)
     scene.show_path(_set_points(views))
-    aimed = aim("chase", views[0])
+    aimed = overview(views)
     if aimed is not None:
         server.initial_camera.position, server.initial_camera.look_at = aimed
     scene.show(views[0])

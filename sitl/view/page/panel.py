@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sitl.view.view import View
+from sitl_bridge.frames import Triple
 
 Array = NDArray[np.float64]
 CAMERAS = ("free", "chase", "top", "load")
 PLOTTED = ("tension [N]", "swing [°]", "tilt [°]", "battery [%]")
-NEAREST, DISTANCE_SHARE = 2.5, 0.9
+NEAREST, DISTANCE_SHARE = 1.5, 0.9
 """m from which a vehicle without a load is looked at, and how much more (m) for each metre of cable."""
+MARGIN = 0.5
+"""m around everything that is in sight in an overview."""
+FIELD_OF_VIEW = math.radians(75.0)
+"""Vertical, of viser's camera."""
+FROM_SOUTH_WEST = (-0.62, -0.62, 0.48)
+"""Direction of length 1 to the camera of an overview."""
 HISTORY_S = 30.0
 BACK_IN_TIME = 0.5
 """s: a moment so much earlier than the last begins the plots anew."""
@@ -101,7 +109,7 @@ def plotted(view: View) -> tuple[float, ...]:
     )
 
 
-def aim(camera: str, view: View) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
+def aim(camera: str, view: View) -> tuple[Triple, Triple] | None:
     """Where a camera is and what it looks at, m; None where the person moves it."""
     if view.vehicle is None or camera == "free":
         return None
@@ -115,6 +123,19 @@ def aim(camera: str, view: View) -> tuple[tuple[float, float, float], tuple[floa
     if camera == "load":
         return (target[0] + 0.3, target[1] - 0.5, target[2] + 0.1), view.vehicle
     return (x - 0.7 * distance, y - 0.7 * distance, z + 0.2 * distance), (middle[0], middle[1], middle[2])
+
+
+def overview(views: Sequence[View]) -> tuple[Triple, Triple] | None:
+    """Where a camera is that has a whole flight in sight, and what it looks at, m; None: no vehicle."""
+    seen = [at for view in views for at in (view.vehicle, view.load, view.set_point) if at is not None]
+    if not seen:
+        return None
+    low, high = np.min(seen, axis=0), np.max(seen, axis=0)
+    centre = 0.5 * (low + high)
+    around = max(NEAREST, 0.5 * float(np.linalg.norm(high - low)) + MARGIN)
+    away = around / math.sin(0.5 * FIELD_OF_VIEW) * np.array(FROM_SOUTH_WEST)
+    (x, y, z), (to_x, to_y, to_z) = (centre + away).tolist(), centre.tolist()
+    return (x, y, z), (to_x, to_y, to_z)
 
 
 def numbers(view: View) -> str:

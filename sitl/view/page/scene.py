@@ -47,6 +47,7 @@ class Scene:
         self._last_time: float | None = None
         self._trails = {body: deque[Triple](maxlen=TRAIL_POINTS) for body in _TRAILS}
         self._lines: dict[str, Any] = {}
+        self._wind: Any = None
         self._draw_ground()
         self._cable = CableScene(server.scene, vehicle)
         self._plan = PlanScene(server.scene, vehicle.ground.height if vehicle.ground is not None else 0.0)
@@ -85,8 +86,7 @@ class Scene:
         for body, at in (("vehicle", view.vehicle), ("load", view.load)):
             if at is not None:
                 self._trail(body, at)
-        if view.wind is not None and view.vehicle is not None and math.hypot(*view.wind) > LEAST_WIND:
-            self._show_wind(view.vehicle, view.wind)
+        self._show_wind(view.vehicle, view.wind)
 
     def show_path(self, points: NDArray[np.float64]) -> None:
         """Draw the reference's way: points (n, 3), m, world."""
@@ -183,9 +183,13 @@ class Scene:
         points.append(at)
         self._draw_line(f"/trail/{body}", np.array(points), _TRAILS[body], 1.5)
 
-    def _show_wind(self, at: Triple, wind: Triple) -> None:
-        head = tuple(a + 0.2 * w for a, w in zip(at, wind, strict=True))
-        self._scene.add_arrows("/wind", np.array([[at, head]]), (80, 160, 200))
+    def _show_wind(self, at: Triple | None, wind: Triple | None) -> None:
+        blows = at is not None and wind is not None and math.hypot(*wind) > LEAST_WIND
+        if at is not None and wind is not None and blows:
+            head = tuple(a + 0.2 * w for a, w in zip(at, wind, strict=True))
+            self._wind = self._scene.add_arrows("/wind", np.array([[at, head]]), (80, 160, 200))
+        elif self._wind is not None and self._wind.visible:
+            self._wind.visible = False
 
 
 def contact_points(vehicle: Vehicle, attitude: Quaternion) -> list[Triple]:

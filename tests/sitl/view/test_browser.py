@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, sync_playwright
 
+import sitl
 from tests.patience import PATIENCE
 from tests.sitl.export.flights import leave_flight
 
@@ -43,7 +44,11 @@ def page() -> Iterator[Page]:
 
 @pytest.fixture
 def flight(tmp_path: Path) -> Path:
-    leave_flight(tmp_path)
+    """Two seconds made by hand; for a picture a real flight, of which there is something to see."""
+    if PICTURES:
+        sitl.fly("circle", vehicle="iris", feedback="truth", duration_s=20.0, out=tmp_path)
+    else:
+        leave_flight(tmp_path)
     return tmp_path
 
 
@@ -79,7 +84,7 @@ def test_a_finished_flight_is_played_and_paused(flight: Path, page: Page) -> Non
             if PICTURES:
                 for close in page.locator("button.mantine-Notification-closeButton").all():
                     close.click()  # a remark on software rendering
-                page.wait_for_timeout(1000)
+                page.wait_for_timeout(9000)
                 page.screenshot(path=Path(PICTURES) / "view.png")
             assert len(np.unique(seen.reshape(-1, seen.shape[-1]), axis=0)) > 20  # not blank
             page.get_by_role("checkbox", name="Play").click(force=True)

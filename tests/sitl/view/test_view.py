@@ -12,12 +12,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from viser import ViserServer
 
 from sitl.command_line.commands import main
 from sitl.flights.scenario import Circle, load_scenario
 from sitl.recording.recording import RecordingError, read_recording
 from sitl.view.page.cable import along, colour_of, load_shares
-from sitl.view.page.panel import aim, numbers, plotted
+from sitl.view.page.panel import FIELD_OF_VIEW, aim, numbers, overview, plotted
+from sitl.view.page.scene import Scene
 from sitl.view.replay import views_of_recording, views_of_tlog
 from sitl.view.run import ViewOptions, announce
 from sitl.view.view import View
@@ -91,6 +93,34 @@ def test_a_camera_looks_at_what_flies_from_elsewhere(camera: str) -> None:
     position, target = aimed
     assert math.dist(position, target) > 0.1
     assert aim("free", view) is None
+
+
+def test_an_overview_has_the_whole_flight_in_sight() -> None:
+    """Of a page that nobody aims at anything, wherever the flight goes."""
+    way = [(5.0 * math.cos(0.1 * k), 5.0 * math.sin(0.1 * k), 0.2 * k) for k in range(60)]
+    views = [View(vehicle=(x, y, z + 2.0), load=(x, y, z)) for x, y, z in way]
+    aimed = overview(views)
+    assert aimed is not None
+    position, target = map(np.array, aimed)
+    ahead = (target - position) / np.linalg.norm(target - position)
+    for view in views:
+        for at in (view.vehicle, view.load):
+            to_it = np.array(at) - position
+            assert math.acos(to_it @ ahead / np.linalg.norm(to_it)) < 0.5 * FIELD_OF_VIEW
+    assert overview([View()]) is None
+
+
+def test_an_arrow_shows_the_wind_while_it_blows() -> None:
+    server = ViserServer(port=0, verbose=False)
+    try:
+        scene = Scene(server, load_vehicle("iris", []))
+        arrows = []
+        for wind in ((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 2.0, 0.0), None):
+            scene.show(View(vehicle=(0.0, 0.0, 2.0), wind=wind))
+            arrows.append(scene._wind.visible)
+        assert arrows == [True, False, True, False]
+    finally:
+        server.stop()
 
 
 def test_each_piece_of_a_chain_pulls_as_its_spring_does() -> None:
