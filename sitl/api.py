@@ -47,23 +47,23 @@ DEFAULT_DURATION = 60.0
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight that is over. World ENU, body FLU, SI units."""
+    """The result of a flight. World ENU, body FLU, SI units; n is the number of ticks."""
 
     summary: dict[str, Any]
-    """The keys of `summary.json`; `estimate`, `picture`, `state_log_sha256` only with `out`."""
+    """The content of `summary.json`. Only with `out` it has `estimate`, `picture` and `state_log_sha256`."""
     states: Mapping[str, Array]
-    """Columns of the state log, each (n,)."""
+    """Columns of the state log by name, each (n,)."""
     estimates: Mapping[str, Array] | None
-    """Columns of the estimate's log, each (m,); None without `out`, or on truth."""
+    """Columns of the estimate's log by name, each (m,). None without `out`, or for a flight on truth."""
     reference: Array
-    """(n, 3), m: where the load was to be at each row, as it was set."""
+    """(n, 3), m: the load's set-point at each tick, as the scenario gives it."""
     said: tuple[str, ...]
-    """What plant and controller had to say."""
+    """Messages of plant and controller, in order."""
     out: Path | None
-    """Where the logs are; None: nowhere."""
+    """Folder of the logs; None if nothing was written."""
 
     def table(self) -> Any:
-        """The state log with the reference as an Arrow table; `.to_pandas()` makes a data frame of it."""
+        """Return state log and reference as an Arrow table; `.to_pandas()` makes a data frame."""
         import pyarrow as pa
 
         columns = {
@@ -73,7 +73,7 @@ class Flight:
         return pa.table({name: pa.array(column) for name, column in columns.items()})
 
     def picture(self, file: str | Path) -> None:
-        """Draw the flight as `flight.png` shows it."""
+        """Draw the flight into a file, as in `flight.png`."""
         draw(Path(file), dict(self.states), self.reference, self.summary)
 
 
@@ -93,18 +93,26 @@ def fly(
     out: str | Path | None = None,
     logs: Logs = "usual",
 ) -> Flight:
-    """Fly a scenario, and return when it is over.
+    """Fly a scenario in this process, and return when the flight is over.
 
-    scenario: a shipped name, a .toml file, or a `Scenario`. vehicle: a shipped name, a .toml file, or a
-    complete `Vehicle`; by default the scenario's. overrides: `KEY=VALUE` as for `--set`. plant_overrides: the
-    same, but the controller is not told. law: a class of one's own instead of the design, see
-    `controller.own_law.interface`, or its name as for `--law`. agility: how fast the load goes to its
-    reference, 0 (gentle) to 1 (all that the vehicle can do), by default the scenario's, else 0.7. feedback:
-    `truth` or `estimate`, by default as for `sitl fly`. out: a folder for all that `sitl fly` leaves; by
-    default nothing is written. logs: how much is left there, `none` (the summary), `usual` or `all`.
+    Arguments:
+        scenario: a shipped name, a .toml file, or a `sitl.flights.scenario.Scenario`.
+        vehicle: a shipped name, a .toml file, or a complete `Vehicle`. None: the scenario's.
+        overrides: `KEY=VALUE` each, as for `--set`.
+        plant_overrides: the same for the plant alone; the controller does not know of them.
+        seed: of everything random.
+        design: law and gains, as for `--design`.
+        law: your own law instead of a design: a class, or its name as for `--law`.
+        agility: how fast the load goes to its set-point, from 0 (gentle) to 1 (the vehicle's limits). None:
+            the scenario's, or 0.7.
+        feedback: what the law flies on, `truth` or `estimate`. None: as for `sitl fly`.
+        rate_hz: ticks a second.
+        duration_s: simulated seconds. None: the scenario's, or 60.
+        out: folder for the files that `sitl fly` writes. None: nothing is written.
+        logs: how much is written there: `none` (only the summary), `usual` or `all`.
 
-    Raises DescriptionError, with a line for each fault, for what cannot be flown; LawError when the law
-    fails in flight.
+    Raises DescriptionError if the flight cannot be flown, with a line for each fault. Raises LawError if your
+    law fails in flight.
     """
     agility = _checked_agility(agility)
     if isinstance(scenario, str):

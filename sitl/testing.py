@@ -25,20 +25,20 @@ STOP_PATIENCE = 120.0
 
 @dataclass(frozen=True)
 class SimulatedVehicle:
-    """Where to reach it, and what it leaves."""
+    """Addresses of a running vehicle, and the files that it leaves."""
 
     mavsdk: str
-    """Connection string for MAVSDK"""
+    """Connection string for the first MAVSDK client"""
     mavproxy: str
-    """`--master` of MAVProxy, and connection string of pymavlink"""
+    """Connection string for the first ground station: `--master` of MAVProxy, or for pymavlink"""
     ground: str
-    """Where it hears any further ground station, for pymavlink (`udpout:…`)"""
+    """Connection string for each further ground station, for pymavlink (`udpout:…`)"""
     companion: str
-    """Where it hears any further companion or MAVSDK script (`udpout://…`)"""
+    """Connection string for each further companion or MAVSDK client (`udpout://…`)"""
     state_log: Path
-    """The simulated truth, a Parquet file; complete when the vehicle is gone"""
+    """The true states, a Parquet file; there is one once the vehicle has stopped"""
     log: Path
-    """What the processes said"""
+    """Text file with the messages of the processes"""
 
 
 @contextlib.contextmanager
@@ -48,10 +48,16 @@ def flying_vehicle(
     parameters: Mapping[str, float] | None = None,
     scenario: str = "hold",
 ) -> Iterator[SimulatedVehicle]:
-    """Start a vehicle that waits for ground control; it is gone on leaving.
+    """Start a vehicle that waits for ground control. A context manager: the vehicle stops at its end.
 
-    folder: for logs. arguments: of `sitl fly`; by default plant and controller wait for each other, so that
-    a busy machine makes the flight slower but not different. parameters: values to start with.
+    Arguments:
+        folder: for the logs; it is made if it does not exist.
+        arguments: further arguments of `sitl fly`. With the default, plant and controller wait for each
+            other: a busy machine makes the flight slower, not different.
+        parameters: the autopilot's parameters to start with, by name.
+        scenario: one that leaves the flight to ground control, by name or .toml file.
+
+    Raises RuntimeError, with what the vehicle said, if it does not start.
     """
     hil, gcs, gcs_peer, onboard, onboard_peer = free_ports(5)
     folder.mkdir(parents=True, exist_ok=True)

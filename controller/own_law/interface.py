@@ -1,4 +1,4 @@
-"""What a law of one's own is given and returns. SI units, world ENU (z up), body FLU."""
+"""What your own law is given, and what it returns. SI units, world ENU (z up), body FLU."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sitl_bridge.vehicle.description import Vehicle
 
 
 class Estimate(NamedTuple):
-    """Where everything is at this tick: the plant's truth, or the estimate from its sensors."""
+    """The state at this tick: the plant's truth, or the estimate from its sensors."""
 
     time_s: float
     """s since the law took over."""
@@ -21,7 +21,7 @@ class Estimate(NamedTuple):
     attitude: Array
     """(3,), rad: roll, pitch, yaw; `rotation` is Rz(yaw)·Ry(pitch)·Rx(roll)."""
     rotation: Array
-    """(3, 3), body FLU to world ENU; its last column is where the thrust points."""
+    """(3, 3), from body FLU to world ENU. Its last column is the direction of the thrust."""
     body_rates: Array
     """(3,), rad/s: p, q, r about the body's axes."""
     load_position: Array
@@ -35,13 +35,13 @@ class Estimate(NamedTuple):
     cable_stretch: float
     """m beyond the rest length; negative while the cable is slack."""
     cable_tension: float
-    """N, with which the cable pulls by its description, eq. 9; negative where a two-way cable pushes."""
+    """N, of the described cable (eq. 9). Negative if the cable pushes, which only a two-way cable does."""
     state: Array
-    """(18,): the same in the order of eq. 31, for linear laws."""
+    """(18,): the same values in the order of eq. 31, for linear laws."""
 
 
 class Reference(NamedTuple):
-    """Where the load is to be at this tick: a smooth motion that the vehicle can follow, world ENU."""
+    """The load's set-point at this tick, on a smooth motion that the vehicle can follow. World ENU."""
 
     time_s: float
     """s since the law took over."""
@@ -56,7 +56,7 @@ class Reference(NamedTuple):
     snap: Array
     """(3,), m/s⁴."""
     goal: Array
-    """(3,), m: the point that the scenario sets, without the smooth way there; a flight is judged by it."""
+    """(3,), m: the scenario's set-point itself, without a smooth motion to it. Reports measure against it."""
     yaw: float
     """rad."""
     yaw_rate: float
@@ -64,10 +64,10 @@ class Reference(NamedTuple):
 
 
 class Wrench(NamedTuple):
-    """Thrust and moments, from which the rotor commands are allocated within the rotors' limits."""
+    """Thrust and moments. The rotor commands follow from them, within the rotors' limits."""
 
     thrust: float
-    """N, of all rotors together, along the body's z axis."""
+    """N, sum of all rotors, along the body's z axis."""
     moments: Array | Sequence[float]
     """(3,), N m, about the body's axes."""
 
@@ -77,18 +77,18 @@ Answer = Wrench | tuple[float, Array | Sequence[float]] | Array | Sequence[float
 
 
 class OwnLaw(Protocol):
-    """A law. A new object is made for each flight, and for a trial before it."""
+    """A control law. Each flight makes a new object; so does a trial before the flight."""
 
     def __init__(self, *, vehicle: Vehicle, rate_hz: float) -> None:
-        """vehicle: as the controller is told; rate_hz: calls of `step` a second."""
+        """Take the vehicle as the controller knows it, and `rate_hz`, the calls of `step` a second."""
 
     def step(self, estimate: Estimate, reference: Reference) -> Answer:
-        """What the rotors are to do until the next tick.
+        """Return what the rotors do until the next tick.
 
-        A law that returns a wrench may keep what it is the sum of in an attribute `terms`: wrenches (4,), N
-        and N m, by the names `feedforward`, `proportional`, `integral`, `delay`. They are logged.
+        A law that returns a wrench may also set an attribute `terms`, which is logged: a dict with the parts
+        of that sum, named `feedforward`, `proportional`, `integral`, `delay`. Each is (4,), N and N m.
         """
 
 
 class LawError(RuntimeError):
-    """A law raised an exception or returned what cannot be flown: which law, where in its file, and when."""
+    """A law raised an exception, or returned what cannot be flown. Says which law, which line, and when."""

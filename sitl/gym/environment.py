@@ -47,10 +47,18 @@ class SlungLoad(gymnasium.Env[Observation, NDArray[np.float32]]):
         observation: str = "truth",
         render_mode: str | None = None,
     ) -> None:
-        """vehicle: name, file, or complete; overrides: `KEY=VALUE`, as for `--set`.
+        """Make an environment; `gymnasium.make("sitl/Position-v0", …)` passes its arguments on.
 
-        task: position or delivery; actions: rates or rotors; observation: truth or sensors. Raises ValueError
-        for others, DescriptionError for a faulty vehicle.
+        Arguments:
+            task: `position` or `delivery`.
+            vehicle: a shipped name, a .toml file, or a complete `Vehicle`.
+            overrides: `KEY=VALUE` each, as for `--set`.
+            actions: `rates` (thrust and body rates) or `rotors` (a command for each).
+            observation: `truth` or `sensors`.
+            render_mode: None; there is no other.
+
+        Raises ValueError for another task, action, observation or render mode, and DescriptionError for a
+        faulty vehicle.
         """
         if observation not in OBSERVATIONS:
             raise ValueError(f"observation = {observation!r}; expected truth or sensors")
@@ -75,7 +83,7 @@ class SlungLoad(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode; the same seed begins the same one. There are no options."""
+        """Begin an episode. The same seed gives the same episode; `options` are ignored."""
         super().reset(seed=seed)
         surrounded, self._target = self._task.begin(self._vehicle, self.np_random)
         self._plant = GymPlant(surrounded, int(self.np_random.integers(2**31)), self._on_sensors)
@@ -84,7 +92,7 @@ class SlungLoad(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observed(), self._info()
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Fly a fiftieth of a second. Terminates when the vehicle is lost, or the task fulfilled."""
+        """Fly for 20 ms. The episode terminates when the vehicle is lost or the task is done."""
         plant = self._flying()
         given = np.asarray(action, dtype=np.float64)
         if given.shape != self.action_space.shape or not np.isfinite(given).all():
