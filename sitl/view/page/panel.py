@@ -16,7 +16,7 @@ from sitl_bridge.frames import Triple
 Array = NDArray[np.float64]
 CAMERAS = ("free", "chase", "top", "load")
 PLOTTED = ("tension [N]", "swing [°]", "tilt [°]", "battery [%]")
-NEAREST, DISTANCE_SHARE = 1.5, 0.9
+NEAREST, DISTANCE_SHARE = 2.0, 0.9
 """m from which a vehicle without a load is looked at, and how much more (m) for each metre of cable."""
 MARGIN = 0.5
 """m around everything that is in sight in an overview."""

@@ -81,14 +81,15 @@ def test_a_finished_flight_is_played_and_paused(flight: Path, page: Page) -> Non
             page.get_by_text("tension").first.wait_for()
             assert until_moving(page)
             seen = picture(page)
+            assert len(np.unique(seen.reshape(-1, seen.shape[-1]), axis=0)) > 20  # not blank
+            if PICTURES:
+                page.wait_for_timeout(9000)
+            page.get_by_role("checkbox", name="Play").click(force=True)
+            page.wait_for_timeout(1500)
             if PICTURES:
                 for close in page.locator("button.mantine-Notification-closeButton").all():
                     close.click()  # a remark on software rendering
-                page.wait_for_timeout(9000)
                 page.screenshot(path=Path(PICTURES) / "view.png")
-            assert len(np.unique(seen.reshape(-1, seen.shape[-1]), axis=0)) > 20  # not blank
-            page.get_by_role("checkbox", name="Play").click(force=True)
-            page.wait_for_timeout(1500)
             still = page.get_by_role("textbox").first.input_value()
             page.wait_for_timeout(1000)
             assert page.get_by_role("textbox").first.input_value() == still
