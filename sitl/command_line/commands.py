@@ -45,6 +45,11 @@ def _ground_options(arguments: argparse.Namespace) -> GroundOptions:
             read_key(arguments.signing_key)
         except KeyFileError as error:
             raise DescriptionError("--signing-key", [str(error)]) from None
+    kept = arguments.parameters
+    if kept is not None and kept.exists() and not kept.is_file():
+        raise DescriptionError(
+            "--parameters", [f"{kept}: no file; expected one of names and numbers, or none yet"]
+        )
     return GroundOptions(
         arguments.gcs, arguments.onboard, arguments.signing_key, arguments.parameters, arguments.expose
     )

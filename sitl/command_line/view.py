@@ -80,6 +80,8 @@ def run_view(arguments: argparse.Namespace) -> int:
                 return _refuse(f"{error}, or the folder or .tlog of a finished flight")
     if arguments.export is not None and not flights:
         return _refuse("--export: goes with the folder or .tlog of a finished flight")
+    if arguments.export is not None and not arguments.export.absolute().parent.is_dir():
+        return _refuse(f"--export: {arguments.export.parent}: no such folder")
     if arguments.scenario is not None and flights:
         return _refuse("--scenario: goes with links; a finished flight has its own reference")
     options = ViewOptions(

@@ -31,10 +31,12 @@ def read_key(path: Path) -> bytes:
     try:
         text = path.read_text(encoding="ascii").strip()
         key = bytes.fromhex(text)
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except OSError as error:
         raise KeyFileError(
-            f"{path}: cannot be read as a signing key of 64 hexadecimal digits: {error}"
+            f"{path}: {error.strerror}; expected a signing key of 64 hexadecimal digits"
         ) from None
+    except ValueError:
+        raise KeyFileError(f"{path}: not a signing key of 64 hexadecimal digits") from None
     if len(text) != 64:
         raise KeyFileError(f"{path}: {len(text)} characters, a signing key has 64 hexadecimal digits")
     return key

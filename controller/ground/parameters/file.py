@@ -18,9 +18,10 @@ class ParameterFile:
         """The values, and what is wrong with the file (empty if nothing, also if there is none yet).
 
         A file that cannot be read as what it should be is put aside, so that the next save does not lose it.
+        A folder or a device stays where it is. A byte order mark is left out.
         """
         try:
-            values = json.loads(self._path.read_text(encoding="utf-8"))
+            values = json.loads(self._path.read_text(encoding="utf-8-sig"))
             if isinstance(values, dict):
                 return values, ""
             fault = "not a table of names and numbers"
@@ -29,6 +30,8 @@ class ParameterFile:
         except (OSError, ValueError, RecursionError) as error:
             fault = str(error)
         aside = self._path.with_name(self._path.name + ".corrupt")
+        if self._path.exists() and not self._path.is_file():
+            return {}, f"{self._path.name}: no file; defaults used"
         try:
             os.replace(self._path, aside)
         except OSError:

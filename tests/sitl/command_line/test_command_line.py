@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from controller.ground.parameters.file import ParameterFile
 from sitl.benchmark import bench
 from sitl.command_line import commands as cli
 from sitl.command_line.arguments import build_parser
@@ -107,6 +108,16 @@ def test_a_fault_that_the_vehicle_cannot_have_is_refused_before_launch(kind: str
     [line] = refused("fly", str(file), cwd=tmp_path)
     assert line == "faults: faults.rotor.0.rotor = 5: iris has rotors 1 to 4"
     assert not (tmp_path / "runs").exists()
+
+
+def test_a_folder_for_parameters_is_refused_and_stays(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    [line] = refused("fly", "hold", "--parameters", str(folder))
+    assert line.startswith(f"--parameters: {folder}: no file")
+    values, fault = ParameterFile(folder).load()
+    assert (values, "no file" in fault) == ({}, True)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
 def test_no_summary_of_a_flight_that_is_left_to_ground_control() -> None:

@@ -42,6 +42,7 @@ def sitl_view(*arguments: str) -> subprocess.CompletedProcess[str]:
         (("nonsense",), "udpout|udpin|"),
         (("nonsense",), "finished flight"),
         (("udpin:127.0.0.1:20001", "--export", "x.html"), "--export"),
+        ((".", "--export", "/nowhere/x.html"), "no such folder"),
         ((".", "udpin:127.0.0.1:20001"), "shown alone"),
         ((".",), "state.parquet"),
         ((".", "--scenario", "circle"), "--scenario"),
