@@ -34,6 +34,18 @@ print(autopilot.law[0].tobytes().hex(), autopilot.law[2].tobytes().hex())
 print("scipy" in sys.modules)
 """
 
+GUIDED = """
+import sys
+from controller.design.kept import keep_on_disk
+from controller.ground.flight.motion.trajectory import Trajectory
+import controller.pilot.guided.session
+
+keep_on_disk()
+print(Trajectory(0.004).path.tobytes().hex())
+print("scipy" in sys.modules)
+"""
+"""What a flight under ground control takes beside its gains."""
+
 
 @pytest.fixture
 def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -91,7 +103,8 @@ def test_only_who_asks_for_it_keeps(disk: Path, monkeypatch: pytest.MonkeyPatch)
     assert list(disk.iterdir()) == []
 
 
-def test_a_second_flight_takes_no_scipy(tmp_path: Path) -> None:
+@pytest.mark.parametrize("script", [FLIGHT, GUIDED], ids=["flight", "guided"])
+def test_a_second_flight_takes_no_scipy(script: str, tmp_path: Path) -> None:
     """The machine code is where it always is; results go to an empty place."""
     start = f"""
 from pathlib import Path
@@ -101,7 +114,7 @@ files.directories = lambda: [Path({str(tmp_path)!r}), *code()]
 """
     flights = [
         subprocess.run(
-            [sys.executable, "-c", start + FLIGHT], capture_output=True, text=True, check=True, timeout=600
+            [sys.executable, "-c", start + script], capture_output=True, text=True, check=True, timeout=600
         ).stdout.splitlines()
         for _ in range(2)
     ]

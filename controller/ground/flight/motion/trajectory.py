@@ -9,8 +9,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import linalg
 
+from controller.design.motion.exponential import exponential
 from controller.ground.flight.motion.setpoint_types import Follow, Goto, Land
 from controller.law.approach import BRAKING_SHARE, advance_path, rebase_path
 from controller.law.guide import BASE, DERIVATIVES, LANDING, MOVING, POINT
@@ -77,7 +77,7 @@ def _transitions(period: float, feedback: Array) -> tuple[Array, Array]:
     a[order - 1, :order] = -feedback
     a[order - 1, order] = feedback[0]
     a[order, order + 1] = a[order + 1, order + 2] = 1.0
-    transition = linalg.expm(a * period)
+    transition = exponential(a * period)
     return transition[:order, :order], transition[:order, order:]
 
 
@@ -94,7 +94,7 @@ class Trajectory:
         guide["active"] = with_the_law
         guide["period"], guide["feedback"], guide["ahead"] = period, feedback, feedback[:BASE] / feedback[0]
         guide["own"], guide["pull"] = _transitions(period, feedback)
-        guide["coast"] = linalg.expm(np.eye(BASE, k=1) * period)
+        guide["coast"] = exponential(np.eye(BASE, k=1) * period)
         self._base, self._gap, self._carrot = guide["base"], guide["gap"], guide["carrot"]
         self._asked = np.zeros((BASE, 3))
         self._rebase = rebase_path.bind(self.path, self._asked)
