@@ -84,7 +84,8 @@ class HeldForce(HeldTable):
     def draw(self) -> None:
         """Fresh draws."""
         if not self.constant:
-            self.table[:] = self._generator.standard_normal((TABLE_ROWS, 6)) * self._std
+            self._generator.standard_normal(out=self.table)
+            self.table *= self._std
 
 
 class HeldWind(HeldTable):
