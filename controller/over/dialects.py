@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import common as mavlink
 
+from controller.over.stack import AttitudeGains
+
 _CUSTOM = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 
@@ -52,6 +54,10 @@ class Dialect(NamedTuple):
     """Parameter, bits that have to be set in it before thrust is taken for thrust, and what it means else."""
     patience_parameter: str | None
     """Parameter that says for how many seconds the last set-point is flown when no more come."""
+    attitude_parameters: tuple[str, str]
+    """Parameters with the gains of the attitude loop, tilt and yaw."""
+    attitude_gains: AttitudeGains
+    """Those gains where no parameter says them: the defaults of these."""
 
 
 PX4 = Dialect(
@@ -66,6 +72,8 @@ PX4 = Dialect(
     thrust_curve=0.0,
     options=None,
     patience_parameter="COM_OF_LOSS_T",
+    attitude_parameters=("MC_ROLL_P", "MC_YAW_P"),
+    attitude_gains=AttitudeGains(6.5, 2.8),
 )
 ARDUCOPTER = Dialect(
     name="ArduCopter",
@@ -79,6 +87,8 @@ ARDUCOPTER = Dialect(
     thrust_curve=1.0,
     options=("GUID_OPTIONS", 8, "thrust of a set-point is a climb rate"),
     patience_parameter="GUID_TIMEOUT",
+    attitude_parameters=("ATC_ANG_RLL_P", "ATC_ANG_YAW_P"),
+    attitude_gains=AttitudeGains(4.5, 4.5),
 )
 DIALECTS = {"px4": PX4, "ardupilot": ARDUCOPTER}
 _BY_AUTOPILOT = {mavlink.MAV_AUTOPILOT_PX4: PX4, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA: ARDUCOPTER}

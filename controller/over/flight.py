@@ -17,20 +17,21 @@ from controller.over.ages import Ages
 from controller.over.baseline import Baseline, message, target
 from controller.over.dialects import DIALECTS, ModeNumbers
 from controller.over.identify.probe import Probe
-from controller.over.law import CompanionLaw, Setpoint, design
+from controller.over.law import CompanionLaw, Setpoint
 from controller.over.live.reference import LiveReference
 from controller.over.load.source import LoadSource
-from controller.over.stack import Stack, full_thrust, thrust_setpoint
+from controller.over.model import Steering, design
+from controller.over.setpoint_message import attitude_target
+from controller.over.stack import AttitudeGains, Stack, full_thrust, thrust_setpoint
 from controller.over.states import State, Step
 from controller.over.telemetry import Telemetry
-from sitl_bridge.frames import Geodetic, LocalOrigin, Triple, flu_to_frd
+from sitl_bridge.frames import Geodetic, LocalOrigin, Triple
 from sitl_bridge.mavlink.framing import Packer
 from sitl_bridge.vehicle.description import Vehicle
 
 OUR_SYSTEM = 200
 RETRY_INTERVAL = 1.0
 """s between two commands of a kind."""
-RATES_ONLY = mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
 NEAR = 1000.0
 """m from the description's origin to the stack's."""
 LAST_TEXTS = 3
@@ -52,6 +53,7 @@ class Flight:
         baseline: Baseline | None = None,
         ages: Ages | None = None,
         live: LiveReference | None = None,
+        steering: Steering = Steering.RATES,
     ) -> None:
         """path_from: the reference for a load at a place, world; duration_s: of the reference.
 
@@ -59,11 +61,13 @@ class Flight:
         baseline: the stack's own position control flies, and the law does not.
         ages: with a simulated world's time, where it is known.
         live: flown instead of path_from's reference.
+        steering: what the stack is given besides the thrust.
         """
         self.vehicle, self.stack, self.source = vehicle, stack, source
         self.path_from, self.duration_s, self.say = path_from, duration_s, say
         self.probe, self.baseline, self.live = probe, baseline, live
         self.dialect = DIALECTS[stack.kind]
+        self.steering = steering
         self.design = design(vehicle, stack, accurate=source.in_world)
         self.telemetry = Telemetry()
         self.ramp_time: float | None = None
@@ -166,6 +170,21 @@ class Flight:
         """DO_SET_MODE."""
         self.pack(dialects.set_mode(self.system, numbers))
 
+    def settle_design(self) -> None:
+        """Design for the stack as it is, now that its parameters are known."""
+        if self.steering is Steering.ATTITUDE:
+            gains = self._attitude_gains()
+            self.design = design(self.vehicle, self.stack, self.source.in_world, gains)
+
+    def _attitude_gains(self) -> AttitudeGains:
+        """As the stack's description has them, else its parameters, else its usual ones."""
+        described, usual = (self.stack.attitude_gain, self.stack.yaw_gain), self.dialect.attitude_gains
+        tilt, yaw = (
+            self.telemetry.parameters.get(name, default) if own is None else own
+            for own, name, default in zip(described, self.dialect.attitude_parameters, usual, strict=True)
+        )
+        return AttitudeGains(tilt, yaw)
+
     def due(self, now: float) -> bool:
         """Whether a command may be sent again."""
         if now < self.next_try:
@@ -178,24 +197,14 @@ class Flight:
         return Setpoint(self.vehicle.hover_thrust, (0.0, 0.0, 0.0))
 
     def send(self, wanted: Setpoint) -> float:
-        """SET_ATTITUDE_TARGET with body rates and thrust; the thrust set-point, 0 to 1."""
+        """SET_ATTITUDE_TARGET with thrust and body rates or attitude; the thrust set-point, 0 to 1."""
         curve = self.stack.thrust_curve
         if curve is None:
             dialect = self.dialect
             curve = self.telemetry.parameters.get(dialect.thrust_parameter or "", dialect.thrust_curve)
         thrust = thrust_setpoint(wanted.thrust, self._full, curve)
         milliseconds = round(self.stack_time * 1e3) & 0xFFFFFFFF
-        self.pack(
-            mavlink.MAVLink_set_attitude_target_message(
-                milliseconds,
-                self.system,
-                1,
-                RATES_ONLY,
-                [1.0, 0.0, 0.0, 0.0],
-                *flu_to_frd(wanted.rates),
-                thrust,
-            )
-        )
+        self.pack(attitude_target(wanted, thrust, milliseconds, self.system))
         return thrust
 
     def _send_position(self, baseline: Baseline, law: CompanionLaw, time_s: float) -> None:

@@ -22,6 +22,7 @@ from controller.over.live.load_system import LoadSystem
 from controller.over.live.reference import LiveReference
 from controller.over.load.filtered import load_source
 from controller.over.load.source import TruthSource
+from controller.over.model import Steering
 from controller.over.stack import Stack
 from controller.over.states import State, Step
 from sitl_bridge.event_log import EventLog
@@ -85,6 +86,8 @@ class OverOptions:
     live: LivePorts | None = None
     """Take points live on these ports, instead of path_from's reference."""
     instance: int = 0
+    steering: Steering = Steering.RATES
+    """What the stack is given besides the thrust."""
 
 
 class Report:
@@ -188,6 +191,7 @@ def run(options: OverOptions, speaker: Speaker, stop: StopRequest) -> dict[str, 
         options.baseline,
         Ages(lambda: None if plant is None else plant.time_s),
         None if live is None else live.reference,
+        options.steering,
     )
     companion = Companion(flight, options.wait_s)
     report = Report(flight, plant, speaker)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.files import DescriptionError, validated
@@ -39,6 +39,23 @@ class Stack(Section):
         ge=0,
         le=1,
     )
+    attitude_gain: float | None = quantity(
+        "1/s",
+        "roll and pitch rate per error of the angle; None: the stack's own parameter",
+        None,
+        gt=0,
+        le=30,
+    )
+    yaw_gain: float | None = quantity(
+        "1/s", "yaw rate per error of the heading; None: the stack's own parameter", None, gt=0, le=30
+    )
+
+
+class AttitudeGains(NamedTuple):
+    """Of a stack's attitude loop, 1/s: the rate that it asks for per error of the angle."""
+
+    tilt: float
+    yaw: float
 
 
 def full_thrust(vehicle: Vehicle, stack: Stack) -> float:

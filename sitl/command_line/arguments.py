@@ -306,6 +306,12 @@ def _over(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--stack", metavar="FILE", type=Path, help="lags, delay and thrust of the stack, TOML")
     group.add_argument(
+        "--steer",
+        choices=("rates", "attitude"),
+        default="rates",
+        help="what the stack is given besides the thrust: body rates, or an attitude (default: rates)",
+    )
+    group.add_argument(
         "--baseline",
         choices=("point", "motion"),
         help="for comparison: let the stack's own position control fly the vehicle, to the raw set-point or "

@@ -17,6 +17,11 @@ from sitl_bridge.vehicle.files import DescriptionError, load_vehicle
 
 DEFAULT_DURATION = 50.0
 """s of sines: the first ten settle."""
+NOT_TO_IDENTIFY = (
+    ("steer", "rates", "it measures how body rates are followed"),
+    ("baseline", None, "the law flies"),
+)
+"""Flags of a companion that mean nothing here: usual value, and why."""
 Group = Callable[[argparse.ArgumentParser], None]
 
 
@@ -54,6 +59,9 @@ def run_identify(arguments: argparse.Namespace) -> int:
 
     if arguments.over is None:
         raise DescriptionError("--over", ["no stack; expected its address, as in udpin:127.0.0.1:14540"])
+    for name, usual, why in NOT_TO_IDENTIFY:
+        if getattr(arguments, name) != usual:
+            raise DescriptionError(f"--{name}", [f"does not go with identify: {why}"])
     overrides = [] if arguments.sensors is None else [f"sensors.preset={arguments.sensors}"]
     vehicle = load_vehicle(arguments.vehicle or "iris", [*overrides, *arguments.set])
     options = over_options(arguments, vehicle, Hover(kind="hover").path, arguments.duration)

@@ -51,6 +51,7 @@ def over_options(
 ) -> OverOptions:
     """What the flags of a companion ask for. Raises DescriptionError."""
     from controller.over.baseline import Baseline
+    from controller.over.model import Steering
     from controller.over.run import OverOptions
     from controller.over.stack import Stack, read_stack
 
@@ -70,6 +71,7 @@ def over_options(
         wait_s=arguments.wait,
         instance=arguments.instance,
         baseline=None if arguments.baseline is None else Baseline(arguments.baseline),
+        steering=Steering(arguments.steer),
     )
 
 
@@ -162,6 +164,7 @@ def fly_over_stack(
         over=str(_stack_address(arguments)),
         load=arguments.load,
         baseline=arguments.baseline,
+        steering=arguments.steer,
         stack=arguments.stack,
         clock=timing.clock,
         speed=timing.speed,

@@ -52,6 +52,8 @@ class OverFlight:
     load: str
     baseline: str | None
     """Who flies instead of the law, for comparison; see `controller.over.baseline`."""
+    steering: str
+    """What the stack is given besides the thrust; see `controller.over.model.Steering`."""
     stack: Path | None
     clock: str
     speed: float | None
@@ -129,6 +131,7 @@ class OverFlight:
             companion += ["--load-from", f"udpin:127.0.0.1:{load_port}"]
         if self.baseline is not None:
             companion += ["--baseline", self.baseline]
+        companion += ["--steer", self.steering]
         if self.stack is not None:
             companion += ["--stack", str(self.stack)]
         return plant, companion
@@ -209,6 +212,7 @@ def _facts(options: OverFlight, account: Account, failure: str | None) -> dict[s
             "address": options.over,
             "load": options.load,
             "baseline": options.baseline,
+            "steering": options.steering,
             "took_over_at_s": account.scenario_time("flying"),
             "handed_back_at_s": account.scenario_time("handing_back"),
             "control_steps": account.companion_end.get("control_steps"),

@@ -19,7 +19,9 @@ from controller.over.ages import Ages
 from controller.over.companion import Companion
 from controller.over.flight import Flight
 from controller.over.identify.probe import Probe
+from controller.over.load.filtered import load_source
 from controller.over.load.source import TruthSource
+from controller.over.model import Steering
 from controller.over.run import Live
 from controller.over.stack import Stack
 from controller.over.states import State
@@ -30,19 +32,19 @@ from sitl_bridge.plant.wire.truth_to import TruthTo
 from sitl_bridge.vehicle.files import load_vehicle
 from tests.estimator.guided import GuidedFlight
 
-IRIS = ("sensors.preset=rtk", "initial.start=ground")
 COMPANION = Address(ONBOARD_LINK, "127.0.0.1", 14540)
 OPERATOR = Address(STATION_LINK, "127.0.0.1", 14550)
 
 
 class FlownOver:
-    """Plant, and autopilot on its estimate; companions on the truth, one after the other."""
+    """Plant, and autopilot on its estimate; companions, one after the other."""
 
-    def __init__(self, *only_plant: str) -> None:
+    def __init__(self, *only_plant: str, sensors: str = "rtk", seed: int = 0) -> None:
         """only_plant: overrides of which autopilot and companions know nothing."""
-        self.told = load_vehicle("iris", IRIS)
-        flown = load_vehicle("iris", [*IRIS, *only_plant])
-        self.stack = GuidedFlight(flown, told=self.told, after_tick=self._exchange)
+        told = (f"sensors.preset={sensors}", "initial.start=ground")
+        self.told = load_vehicle("iris", told)
+        flown = load_vehicle("iris", [*told, *only_plant])
+        self.stack = GuidedFlight(flown, seed, told=self.told, after_tick=self._exchange)
         home = flown.home
         self._truth = TruthTo(0, LocalOrigin(home.latitude, home.longitude, home.altitude))
         self._operator = Packer(245, 190)
@@ -59,10 +61,12 @@ class FlownOver:
         duration_s: float,
         probe: Probe | None = None,
         live: Live | None = None,
+        load: str = "truth",
+        steering: Steering = Steering.RATES,
     ) -> Flight:
         """A companion that knows nothing of what was before, in the place of another."""
-        source, self.said = TruthSource(), []
-        ages = Ages(lambda: source.time_s)
+        source, self.said = load_source(load, self.told), []
+        ages = Ages(lambda: source.time_s if isinstance(source, TruthSource) else self.stack.now)
         flight = Flight(
             self.told,
             Stack(),
@@ -73,6 +77,7 @@ class FlownOver:
             probe=probe,
             ages=ages,
             live=None if live is None else live.reference,
+            steering=steering,
         )
         self.companion, self._live = Companion(flight), live
         return flight

@@ -13,6 +13,7 @@ from controller.law.reference import Path, setpoint
 from controller.over.companion import Companion
 from controller.over.flight import OUR_SYSTEM, Flight
 from controller.over.load.filtered import load_source
+from controller.over.model import Steering
 from controller.over.stack import Stack
 from sitl_bridge.mavlink.framing import Packer, decode, split
 from sitl_bridge.vehicle.files import load_vehicle
@@ -115,14 +116,20 @@ class PlayedStack:
 class Played:
     """A companion against the played stack, in played time."""
 
-    def __init__(self, duration: float = 2.0, wait_s: float = 60.0, stack: PlayedStack | None = None) -> None:
+    def __init__(
+        self,
+        duration: float = 2.0,
+        wait_s: float = 60.0,
+        stack: PlayedStack | None = None,
+        steering: Steering = Steering.RATES,
+    ) -> None:
         self.stack, self.said = stack or PlayedStack(), list[str]()
 
         def path(start: tuple[float, float, float]) -> Path:
             return setpoint(start, start)
 
         source = load_source("none", IRIS)
-        self.flight = Flight(IRIS, Stack(), source, path, duration, self.said.append)
+        self.flight = Flight(IRIS, Stack(), source, path, duration, self.said.append, steering=steering)
         self.companion = Companion(self.flight, wait_s)
 
     def run(self, seconds: float, until: Callable[[], bool] = lambda: False) -> None:

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink
 
 from controller.over.ages import LONGEST_STANDSTILL, Ages
-from controller.over.law import stable
 from controller.over.load.pendulum_filter import PendulumFilter
-from controller.over.stack import Stack, full_thrust, thrust_setpoint
+from controller.over.model import Steering, stable
+from controller.over.stack import AttitudeGains, Stack, full_thrust, thrust_setpoint
 from controller.over.states import State
 from controller.over.telemetry import ClockOffset
+from sitl_bridge.frames import attitude_to_enu_flu, euler_from_quaternion
 from sitl_bridge.plant.physics.state import SPECIFIC_FORCE
 from sitl_bridge.plant.physics.world import World
 from sitl_bridge.vehicle.files import load_vehicle
@@ -29,12 +30,35 @@ from tests.over.played import HOLD, IRIS, LAND, MANUAL, Played
     delay=st.floats(0.0, 0.06),
     length=st.floats(0.5, 15.0),
     accurate=st.booleans(),
+    attitude=st.none() | st.builds(AttitudeGains, st.floats(1.0, 12.0), st.floats(0.5, 5.0)),
 )
 def test_the_sampled_loop_is_stable_for_stacks_and_cables(
-    rate_lag: float, thrust_lag: float, delay: float, length: float, accurate: bool
+    rate_lag: float,
+    thrust_lag: float,
+    delay: float,
+    length: float,
+    accurate: bool,
+    attitude: AttitudeGains | None,
 ) -> None:
     vehicle = load_vehicle("iris", ["initial.start=hover", f"cable.rest_length={length}"])
-    assert stable(vehicle, Stack(rate_lag=rate_lag, thrust_lag=thrust_lag, delay=delay), accurate) < 1.0
+    stack = Stack(rate_lag=rate_lag, thrust_lag=thrust_lag, delay=delay)
+    assert stable(vehicle, stack, accurate, attitude) < 1.0
+
+
+def test_an_attitude_is_asked_for_by_choice() -> None:
+    """With the gains that the stack's parameters say; where it leans is where the force of the law points."""
+    flight = Played(duration=60.0, steering=Steering.ATTITUDE)
+    flight.stack.parameters |= {"MC_ROLL_P": 5.0, "MC_YAW_P": 2.0}
+    flight.run(60.0, lambda: flight.flight.state is State.FLYING and flight.flight.steps > 20)
+    assert flight.flight.design.attitude == AttitudeGains(5.0, 2.0)
+    asked = flight.stack.setpoints[-1]
+    assert asked.type_mask == 0b111
+    assert (asked.body_roll_rate, asked.body_pitch_rate, asked.body_yaw_rate) == (0.0, 0.0, 0.0)
+    euler = euler_from_quaternion(attitude_to_enu_flu(tuple(asked.q)))
+    state = flight.flight.telemetry.vehicle
+    assert state is not None
+    assert euler[2] == pytest.approx(euler_from_quaternion(state.attitude)[2], abs=0.1)
+    assert math.hypot(*euler[:2]) < 0.3
 
 
 @given(force=st.floats(0.5, 28.0), curve=st.floats(0.0, 1.0))

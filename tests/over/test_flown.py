@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import common as mavlink
 from controller.law.reference import Path as Reference
 from controller.law.reference import setpoint
 from controller.over.ages import LONGEST_STANDSTILL
+from controller.over.model import Steering
 from controller.over.run import Live, LivePorts, OverOptions
 from controller.over.stack import read_stack
 from controller.over.states import State
@@ -33,9 +34,10 @@ def hover(start: tuple[float, float, float]) -> Reference:
     return setpoint(start, start)
 
 
-def test_a_step_of_the_load() -> None:
+@pytest.mark.parametrize("steering", Steering)
+def test_a_step_of_the_load(steering: Steering) -> None:
     over = FlownOver()
-    flight = over.start(lambda start: setpoint(TARGET, start), 12.0)
+    flight = over.start(lambda start: setpoint(TARGET, start), 12.0, steering=steering)
     over.run_until(lambda: flight.state is State.DONE, 150.0, "done")
     times, load, vehicle = over.flight()
     assert times[-1] == pytest.approx(12.0, abs=0.1)

@@ -6,7 +6,7 @@ from controller.ground.flight.motion.setpoint_types import Body, Follow, Goto
 from controller.ground.flight.motion.trajectory import Limits, Trajectory, motion_pole
 from controller.law.reference import Path
 from controller.law.state import Array
-from controller.over.law import RATE_HZ
+from controller.over.model import RATE_HZ
 from sitl_bridge.vehicle.description import Vehicle
 
 LIMITS = Limits(acceleration=2.0, total=3.0, speed=5.0, up=3.0, down=1.5)

@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import common as mavlink
 
 from controller.over import dialects
 from controller.over.flight import Flight
-from controller.over.law import RATE_HZ
+from controller.over.model import RATE_HZ, Steering
 from controller.over.states import State
 
 STREAMS = (
@@ -63,6 +63,7 @@ def prepare(flight: Flight, now: float) -> None:
         flight.fail(wrong, now)
         return
     _advise(flight)
+    flight.settle_design()
     flying = t.armed and t.landed == mavlink.MAV_LANDED_STATE_IN_AIR
     flight.go(State.STREAMING if flying else State.ARMING, now)
 
@@ -92,7 +93,8 @@ def _unknown_parameters(flight: Flight) -> list[str]:
     dialect = flight.dialect
     options = None if dialect.options is None else dialect.options[0]
     holds = None if dialect.holds is None else dialect.holds[0]
-    names = (dialect.thrust_parameter, dialect.patience_parameter, options, holds)
+    gains = dialect.attitude_parameters if flight.steering is Steering.ATTITUDE else ()
+    names = (dialect.thrust_parameter, dialect.patience_parameter, options, holds, *gains)
     return [name for name in names if name is not None and name not in flight.telemetry.parameters]
 
 
