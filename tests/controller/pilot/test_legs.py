@@ -87,7 +87,10 @@ def in_parts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 def rows(feedback: str) -> tuple[np.ndarray, list[float]]:  # type: ignore[type-arg]
     vehicle = load_vehicle("paper", ["initial.load_position=[0,0,5]"])
-    flight = sitl.fly(scenario(), vehicle=vehicle, feedback=feedback, duration_s=7.0, seed=3)
+    heavier = ["load.mass=11.0"]  # on truth that is found out, and legs are flown more slowly than planned
+    flight = sitl.fly(
+        scenario(), vehicle=vehicle, plant_overrides=heavier, feedback=feedback, duration_s=7.0, seed=3
+    )
     began = [point["set_at_s"] for point in flight.summary["points"]]
     return np.stack(list(flight.states.values())), began
 
