@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import itertools
 import sys
 import tempfile
@@ -134,7 +135,9 @@ class FlightOptions:
         try:
             open_link(waiting, lambda text: None).close()
         except OSError as error:
-            raise OSError(f"{error}; --instance N flies beside others, --hil on another port") from None
+            in_use = getattr(error.__context__, "errno", None) == errno.EADDRINUSE
+            advice = "; --instance N flies beside others, --hil on another port" if in_use else ""
+            raise OSError(f"{error}{advice}") from None
 
     def check_in_process(self) -> None:
         """Raises DescriptionError for what takes two processes."""

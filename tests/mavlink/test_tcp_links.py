@@ -188,3 +188,9 @@ def test_ports_that_an_address_leaves_out() -> None:
     assert str(parse_address("tcpin:127.0.0.1:1", 14563, 4563)) == "tcpin:127.0.0.1:1"
     with pytest.raises(ValueError, match="expected udpout"):
         parse_address("tcpin:127.0.0.1")
+
+
+@pytest.mark.parametrize("host", ["[::1]", "::1"])
+def test_an_ipv6_address_is_refused_as_such(host: str) -> None:
+    with pytest.raises(ValueError, match="no IPv6"):
+        parse_address(f"udpout:{host}:14560")

@@ -25,9 +25,9 @@ class Address(NamedTuple):
 
 
 def possible_host(text: str) -> bool:
-    """Whether this may be a host's name or address; what has an empty label is neither, and no lookup."""
+    """Whether this may be a host's name or IPv4 address. An empty label is neither; links have no IPv6."""
     try:
-        return bool(text.encode("idna"))
+        return bool(text.encode("idna")) and ":" not in text
     except UnicodeError:
         return False
 
@@ -43,7 +43,10 @@ def parse_address(text: str, udp_port: int | None = None, tcp_port: int | None =
     if ":" not in rest and default is not None:
         host, port = rest or "127.0.0.1", str(default)
     if kind not in KINDS or not possible_host(host) or not port.isdecimal() or not 0 <= int(port) <= 65535:
-        raise ValueError(f"{text!r}: expected {'|'.join(KINDS)}:HOST:PORT, as in udpout:127.0.0.1:14560")
+        no_ipv6 = "; links have no IPv6" if ":" in host else ""
+        raise ValueError(
+            f"{text!r}: expected {'|'.join(KINDS)}:HOST:PORT, as in udpout:127.0.0.1:14560{no_ipv6}"
+        )
     return Address(kind, host, int(port))  # type: ignore[arg-type]  # just checked against KINDS
 
 

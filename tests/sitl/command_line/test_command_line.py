@@ -120,6 +120,12 @@ def test_a_folder_for_parameters_is_refused_and_stays(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
+def test_another_instance_is_no_help_where_an_address_is_not_this_machines() -> None:
+    [line] = refused("fly", "--hil", "udpin:192.0.2.1:5")
+    assert "cannot be opened" in line
+    assert "--instance" not in line
+
+
 def test_no_summary_of_a_flight_that_is_left_to_ground_control() -> None:
     [line] = refused("fly", "hold", "--json")
     assert line.startswith("--json: under ground control")
