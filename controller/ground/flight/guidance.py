@@ -15,13 +15,14 @@ from controller.ground.flight.home import Home
 from controller.ground.flight.hover_point import HoverPoint
 from controller.ground.flight.in_flight import InFlight, Pilot
 from controller.ground.flight.limits.fence import Fence, fence_around
+from controller.ground.flight.limits.fence_ahead import fence_ahead
 from controller.ground.flight.limits.fence_zones import Zone
 from controller.ground.flight.mission_flight import MissionFlight
 from controller.ground.flight.motion.geometry import (
     controlled_body,
     stopping_point,
 )
-from controller.ground.flight.motion.setpoint_types import Attitude, Body, Idle, Target
+from controller.ground.flight.motion.setpoint_types import Attitude, Body, Goto, Idle, Target
 from controller.ground.flight.motion.trajectory import motion_pole
 from controller.ground.flight.px4_modes import Mode
 from controller.ground.flight.stages.ascent import Ascent, Step
@@ -82,6 +83,16 @@ class Guidance:
     def fence(self, with_load: bool = True) -> Fence:
         """The limits around home."""
         return fence_around(self.home.or_origin, self._parameters, self._profile, with_load, self.zones)
+
+    def fence_with_way(self, view: VehicleView, target: Target) -> Fence:
+        """The limits as they are now, and whether the vehicle is about to leave them."""
+        fence = self.fence(view.load_attached)
+        if self.stage is not Stage.FLYING:
+            return fence
+        stop = stopping_point(view, self._parameters, self._pole)
+        goal = target.position if isinstance(target, Goto) else None
+        ahead = fence_ahead(view, fence, stop, goal, self._parameters, self._profile)
+        return fence._replace(ahead=ahead) if ahead else fence
 
     def begin(self, view: VehicleView) -> None:
         """Armed: on the ground, or in the air already."""

@@ -235,7 +235,7 @@ class Machine:
         situation = Situation(
             self.mode, steering.setpoint_fresh(self, now), self.sticks.time, last_station, self._armed_at
         )
-        fence = self.guidance.fence(view.load_attached)
+        fence = self.guidance.fence_with_way(view, self.target)
         for trigger in self.failsafes.check(view, now, situation, self.parameters, fence):
             self.say(trigger.severity, trigger.text)
             if trigger.reaction is Reaction.TERMINATE:

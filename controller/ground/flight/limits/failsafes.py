@@ -39,6 +39,8 @@ class Trigger(NamedTuple):
 
 _LINK = {1: Reaction.HOLD, 2: Reaction.RETURN, 3: Reaction.LAND, 5: Reaction.TERMINATE, 6: Reaction.DISARM}
 _FENCE = {2: Reaction.HOLD, 3: Reaction.RETURN, 4: Reaction.TERMINATE, 5: Reaction.LAND}
+_STOPPING = (Reaction.HOLD, Reaction.RETURN, Reaction.LAND)
+"""What is done at the fence already; a warning or a termination waits until it is left"""
 _OFFBOARD_TO_STICKS = {0: Mode.POSITION, 1: Mode.ALTITUDE}
 _EXCEPTIONS = {Mode.MISSION: 1, Mode.HOLD: 2, Mode.TAKEOFF: 2, Mode.OFFBOARD: 4}
 """Bits of COM_RCL_EXCEPT"""
@@ -127,7 +129,7 @@ def _slow(
         ("battery emergency", left < p["BAT_EMERGEN_THR"]),
         ("inertial", view.health.wrong != ""),
         ("station", gone and p.integer("NAV_DLL_ACT") != 0),
-        ("fence", p.integer("GF_ACTION") != 0 and bool(_outside(view, fence))),
+        ("fence", p.integer("GF_ACTION") != 0 and bool(_outside(view, p, fence))),
     )
 
 
@@ -179,17 +181,20 @@ def _station(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
     return Trigger(reaction, WARNING, f"No ground station for {p['COM_DL_LOSS_T']:g} s: {_word(reaction)}")
 
 
-def _outside(view: VehicleView, fence: Fence) -> str:
-    """Which body is outside the geofence, and how; empty if none is."""
+def _outside(view: VehicleView, p: Parameters, fence: Fence) -> str:
+    """Which body is outside the geofence, or will be, and how; empty if none is."""
     if fault := fence.outside(view.position):
         return f"Vehicle {fault}"
     fault = fence.outside(view.load_position) if view.load_attached else ""
-    return f"Load {fault}" if fault else ""
+    if fault:
+        return f"Load {fault}"
+    stops = _FENCE.get(p.integer("GF_ACTION")) in _STOPPING
+    return f"Geofence ahead: {fence.ahead}" if fence.ahead and stops else ""
 
 
 def _geofence(view: VehicleView, p: Parameters, fence: Fence) -> Trigger:
     reaction = _FENCE.get(p.integer("GF_ACTION"), Reaction.NONE)
-    return Trigger(reaction, CRITICAL, f"{_outside(view, fence)}: {_word(reaction)}")
+    return Trigger(reaction, CRITICAL, f"{_outside(view, p, fence)}: {_word(reaction)}")
 
 
 def _battery(severity: int, word: str, reactions: dict[int, Reaction]) -> _Maker:

@@ -24,6 +24,8 @@ class Fence(NamedTuple):
     """m above home for a vehicle with a hanging load; -inf where there is no ground"""
 
     zones: tuple[Zone, ...] = ()
+    ahead: str = ""
+    """What of the fence is left if the vehicle does not brake now; empty: nothing"""
 
     def outside(self, point: Triple) -> str:
         """Why a position is outside the geofence, or an empty string."""
