@@ -58,6 +58,10 @@ def set_mode(c: Command, machine: Machine, requests: Requests, now: float) -> Ve
         by_flags = next((m for flags, m in _MODES_BY_FLAGS if int(c.p1) & flags == flags), None)
         if by_flags is None:
             return deny(f"Mode denied: no mode has the flags {c.p1:g}; use 1 with PX4's main and sub mode")
+        if by_flags is Mode.MISSION and not (machine.mission.items or machine.armed):
+            # DroneKit's scripts for PX4 ask for AUTO before they upload; PX4 takes any mode while disarmed.
+            machine.enter(by_flags)
+            return OK
         return client_requests.set_mode(machine, by_flags, now)
     numbers = [0.0 if math.isnan(p) else p for p in (c.p2, c.p3)]
     if not all(math.isfinite(number) for number in numbers):

@@ -140,6 +140,8 @@ class Machine:
         if self.armed and not self.terminated:
             return OK
         faults = self.arming_faults()
+        if self.mode is Mode.MISSION and not self.mission.items:
+            faults = [*faults, "there is no mission; upload one, or choose another mode"]
         if faults or self.view is None:
             return not_now("Arming denied: " + "; ".join(faults))
         self._begin_flight(self.view, now)

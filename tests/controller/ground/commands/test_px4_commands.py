@@ -162,6 +162,24 @@ def test_modes_that_px4_names_otherwise(base: float, main: float, sub: float, ex
     assert mode(rig) == expected
 
 
+def test_auto_may_be_asked_for_before_the_mission_is_uploaded() -> None:
+    """As DroneKit's scripts for PX4 do: MAV_MODE_AUTO (4), upload, arm."""
+    rig, client = ready()
+    assert client.command(176, 4).result == ACCEPTED
+    assert mode(rig) == "MISSION"
+    assert client.command(400, 1).result == REJECTED
+    assert "there is no mission" in client.texts()[-1]
+    assert Uploader(client, SQUARE).run() == 0
+    assert client.command(400, 1).result == ACCEPTED
+    rig.run_until(lambda: "Mission finished; holding" in client.texts(), 200.0)
+
+
+def test_auto_without_a_mission_is_denied_in_flight() -> None:
+    rig, client = flying()
+    assert client.command(176, 4).result == DENIED
+    assert mode(rig) == "HOLD"
+
+
 def test_slow_sticks_and_guided_flags_are_position_mode() -> None:
     rig, client = flying()
     for asked in ((1, 3, 2), (mavlink.MAV_MODE_GUIDED_ARMED, 0, 0)):
