@@ -22,7 +22,7 @@ def arming_faults(view: VehicleView | None, parameters: Parameters, fence: Fence
     if not view.estimated:
         return ["the vehicle fell over; restart the plant"]
     faults = []
-    if view.hil_age > parameters["COM_HIL_LOSS_T"]:  # less is a busy machine, which soon goes on
+    if not view.hil_age < parameters["COM_HIL_LOSS_T"]:  # less is a busy machine, which soon goes on
         faults.append(f"no sensor data for {view.hil_age:.1f} s; is the plant running?")
     faults += [f"{name} not ready; wait, or see SYS_STATUS" for name in unhealthy(view)]
     if not view.in_reach:
