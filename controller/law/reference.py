@@ -44,7 +44,7 @@ PATH = np.dtype(
         ("yaw", "f8"),  # rad
         ("yaw_rate", "f8"),  # rad/s
         ("agility", "f8"),  # 0, gentle, to 1, all there is: how fast a planned profile is to be
-        ("unhurried", "i8"),  # 1: it is left by a smooth step, not by the fastest motion
+        ("unhurried", "i8"),  # 1: left by a gentle smooth step, not by the fastest motion
         ("begin", "f8"),  # s, when a leg of a sequence begins; inf: it has not begun
         ("hold", "f8"),  # s, that it goes on after its ramp
         ("local", "i8"),  # 1: the path is `motion`, and nothing of the above but the yaw

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from controller.design.catalogue import design
 from controller.design.motion.limits import limits_of
-from controller.design.motion.ramp import demand, planned
+from controller.design.motion.ramp import demand, planned, smoothly_planned
 from controller.law.flatness import STENCIL, body, flat_motion
 from controller.law.reference import circle, setpoint
 from controller.law.state import EULER_ANGLES, STATE_SIZE
@@ -101,6 +101,21 @@ def test_shorter_cables_and_shorter_steps_are_faster() -> None:
 
     assert ramp(1.0, 5.0) < ramp(10.0, 5.0) < ramp(30.0, 5.0)
     assert ramp(5.0, 1.0) < ramp(5.0, 10.0) < ramp(5.0, 100.0)
+
+
+@pytest.mark.parametrize("name", ["iris", "heavy", "paper"])
+@pytest.mark.parametrize("offset", [0.1, 0.5, 1.0])
+def test_the_estimates_own_error_is_flown_back_gently(name: str, offset: float) -> None:
+    """A hover on estimates begins with one, in whatever weather: nothing is to be gained by haste."""
+    vehicle = load_vehicle(name)
+    path = setpoint(ORIGIN, (0.6 * offset, -0.8 * offset, 0.0))
+    hurried = planned(path, vehicle, estimated=True)
+    path["unhurried"] = 1
+    for plan in (planned(path, vehicle, estimated=True), smoothly_planned(path, vehicle)):
+        ramp_time = float(plan["ramp_time"][0])
+        asked = demand(plan, vehicle, ramp_time, np.linspace(0.0, ramp_time, 1001))
+        assert asked.tilt < math.radians(4.0)
+        assert ramp_time > float(hurried["ramp_time"][0])
 
 
 def test_a_weak_vehicle_takes_longer() -> None:
