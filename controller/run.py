@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from controller.design.names import FOR_ESTIMATES
 from controller.feedback.truth import Feedback, PathFrom, estimates
+from controller.hil.backlog import Inlet
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
 from controller.pilot.stall_clock import StallFreeClock
@@ -216,18 +217,20 @@ def _loop(
     session, guided, own_law = opened.hil, opened.guided, opened.own_law
     gc.freeze()  # what was built at start-up stays; collections in flight have little to look at
     clock = StallFreeClock(time.monotonic())
+    inlet = Inlet(link)
     now = time.monotonic()
     mode = ""
     while stop.reason is None and (most_steps is None or session.steps < most_steps):
         deadline = session.next_deadline()
         if guided is None:
-            received = link.receive(deadline)
+            received = inlet.receive(deadline)
             now = time.monotonic()
         else:
             until = clock.monotonic(min(deadline, guided.next_deadline(now)))
-            received = link.receive(until)
+            received = inlet.receive(until)
             now = clock.now(time.monotonic(), until)
         if received is not None:
+            session.expect(inlet.found())
             session.receive(received, now)
         for datagram in session.to_send(now):
             link.send(datagram)

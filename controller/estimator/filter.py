@@ -235,6 +235,11 @@ class Estimator:
         self.memory["delay_found"] = -1
         self.memory["delay_ticks_compared"] = 0
 
+    def forget_delay(self) -> None:
+        """What was seen so far of how late commands act is no more of use."""
+        self.memory["delay_ticks_watched"] = self.memory["delay_ticks_compared"] = 0
+        self.memory["delay_found"] = -1
+
     def reeled(self, rest_length: float, rate: float) -> None:
         """The winch has made the cable so long (m), and goes on at a rate (m/s, positive pays out)."""
         p = self._filter[0]["p"]

@@ -48,9 +48,12 @@ from controller.estimator.records import (
     Filter,
 )
 from sitl_bridge.compiled import Buffer, entry_point, kernel
+from sitl_bridge.mavlink.hil import ROTORS_STOP_AFTER
 
 MOST_MISSED_TICKS = 50
-"""Ticks without a measurement that the model bridges; of longer silence it knows no more than its length."""
+"""Ticks without a measurement that the model bridges; in longer silence more may happen than it knows."""
+MOST_BRIDGED_TICKS = 1000
+"""For so many it goes on all the same: the rotors stand by then, and all fall alike."""
 BLIND_CLONE_TICKS = 5
 """As long as no fix has said when fixes are taken: near enough to any of them."""
 SLIP_SPEED = 0.3
@@ -107,7 +110,9 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
         report(f, out)
         return int(m.vehicle_mode)
     ticks = int((given.time - m.time) / p.period + 0.5)
-    for _ in range(min(ticks, MOST_MISSED_TICKS)):
+    for missed in range(min(ticks, MOST_BRIDGED_TICKS)):
+        if missed > 0:
+            fly_on(f, missed * p.period)
         predict(f)
         fade_wander(f)
         if m.time > m.next_clone - 0.5 * p.period:
@@ -142,6 +147,19 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
         load_at_rest(f)
     report(f, out)
     return int(m.vehicle_mode)
+
+
+@kernel
+def fly_on(f: Filter, silence: float) -> None:
+    """A tick that did not come, and got no answer: the plant goes on with the last one, and stops at length.
+
+    silence: s, since the last tick that was answered.
+    """
+    m = f.m
+    last, row = (m.command_count - 1) % m.commands.shape[0], m.command_count % m.commands.shape[0]
+    for i in range(MOST_ROTORS):
+        m.commands[row, i] = m.commands[last, i] if silence < ROTORS_STOP_AFTER else 0.0
+    m.command_count += 1
 
 
 @entry_point(Buffer(FILTER, (1,)), Buffer(np.float64, (MOST_ROTORS,)))

@@ -178,6 +178,15 @@ class EstimateFeedback:
         self._record()
         self.estimator.command(controls[: len(self._largest_speeds)] * self._largest_speeds)
 
+    def note_unheard(self, controls: Array | None) -> None:
+        """Note what the rotors do instead. What they turn the vehicle by then says nothing of a delay."""
+        self._record()
+        speeds = self._standing
+        if controls is not None:
+            speeds = controls[: len(self._largest_speeds)] * self._largest_speeds
+        self.estimator.command(speeds)
+        self.estimator.forget_delay()
+
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """Datagram in, estimator, control step, answer out; between two looks at the estimate's health."""
         answer = answer_estimate.bind(*reader.buffers, *self.estimator.arrays, *law, *writer.buffers)
@@ -310,6 +319,10 @@ class TruthBesideEstimate(TruthFeedback):
     def note_command(self, controls: Array, armed: bool) -> None:
         """The estimator has to know."""
         self._beside.note_command(controls, armed)
+
+    def note_unheard(self, controls: Array | None) -> None:
+        """Likewise."""
+        self._beside.note_unheard(controls)
 
     def restart(self) -> None:
         """Align anew."""

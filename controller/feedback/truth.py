@@ -42,6 +42,9 @@ class Feedback(Protocol):
     def note_command(self, controls: Array, armed: bool) -> None:
         """The tick was answered with these controls (16,); disarmed, the rotors stand."""
 
+    def note_unheard(self, controls: Array | None) -> None:
+        """The answer comes too late to act; the rotors have these controls (16,) instead, or stand (None)."""
+
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """The compiled tick of a law in flight; None: there is none, each is to be done in parts."""
 
@@ -65,6 +68,9 @@ class TruthFeedback:
 
     def note_command(self, controls: Array, armed: bool) -> None:
         """Truth does not need to know."""
+
+    def note_unheard(self, controls: Array | None) -> None:
+        """Nor this."""
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """Datagram in, control step, answer out."""

@@ -6,7 +6,7 @@ overtaken gets none.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import inf
 from typing import TYPE_CHECKING, Protocol
 
@@ -14,6 +14,7 @@ from pymavlink.dialects.v20 import common
 
 from controller.feedback.truth import Feedback, PlainTick, TruthFeedback
 from controller.hil.answers import AnswerWriter
+from controller.hil.backlog import Silence
 from controller.hil.tick_rate import TickRate
 from controller.hil.ticks import Tick, TickReader
 from controller.law.control_law import Law
@@ -107,6 +108,10 @@ class HilSession:
         self._instance = instance
         self._out: list[bytes] = []
         self._last_time = 0
+        self._newest = 0
+        """`time_usec` of the last tick that is known to have come"""
+        self._silence: Silence | None = None  # while ticks come too late to be answered in time
+        self._was_late = False
         self._last_answer: bytes | None = None
         self._last_tick = b""  # the datagram to which that was the answer, if given in one compiled call
         self._armed_at: int | None = None
@@ -135,9 +140,18 @@ class HilSession:
         out, self._out = self._out, []
         return out
 
+    def expect(self, datagrams: Sequence[bytes]) -> None:
+        """These have come from the plant as well, and will be received in turn."""
+        for datagram in reversed(datagrams):
+            time_usec = self._reader.read(datagram).time_usec
+            if time_usec is not None:
+                self._newest = time_usec
+                return
+
     def receive(self, datagram: bytes, now: float) -> None:
         """Take a datagram from the plant; the answer is in `to_send`."""
-        if self._plain_tick is not None:
+        in_time = self._silence is None and self._newest <= self._last_time
+        if in_time and self._plain_tick is not None:
             if datagram == self._last_tick and self._last_answer is not None:
                 self._out.append(self._last_answer)  # the answer was lost
                 self._last_heard = now
@@ -162,6 +176,7 @@ class HilSession:
                 self._disarm()
                 self._armed_at = None
                 self._feedback.restart()
+                self._newest, self._silence = 0, None
                 if self._tick_rate is not None:
                     self._tick_rate.restart()
                 if self._terms_log is not None:
@@ -194,6 +209,7 @@ class HilSession:
 
     def _answer(self, time_usec: int, tick: Tick, now: float) -> None:
         at_our_rate = self._tick_rate is None or self._tick_rate.fits(time_usec)
+        late = self._note_silence(time_usec)
         estimate = self._feedback.update(time_usec, tick, self._reader)
         self._follow_delay()
         if estimate is not None and at_our_rate:
@@ -205,7 +221,10 @@ class HilSession:
                 self._say(
                     "disarmed" if before else f"plant and {self._feedback.name} are there: armed, flying"
                 )
-            self._feedback.note_command(self._writer.controls, self._autopilot.armed)
+            if late and self._silence is not None and self._autopilot.armed:
+                self._feedback.note_unheard(self._silence.controls(time_usec))
+            else:
+                self._feedback.note_command(self._writer.controls, self._autopilot.armed)
             self.steps += 1
             if self._terms_log is not None and self._autopilot.armed:
                 self._terms_log.tick(time_usec, self._autopilot)
@@ -218,6 +237,20 @@ class HilSession:
         self._last_time, self._last_tick = time_usec, b""
         self._last_answer = self._writer.answer(time_usec, self._autopilot.armed)
         self._out.append(self._last_answer)
+
+    def _note_silence(self, time_usec: int) -> bool:
+        """Whether the answer to this tick comes too late to act: newer ones have come already.
+
+        The last tick of a backlog is answered in time, as far as is known; if more has come meanwhile it was
+        not, and the silence lasts.
+        """
+        late = time_usec < self._newest and self._autopilot.armed
+        if late and self._silence is None:
+            self._silence = Silence(self._writer.controls, self._last_time)
+        elif not late and not self._was_late:
+            self._silence = None
+        self._was_late = late
+        return late
 
     def _take_law(self, law: Law | None) -> None:
         """Another law may fly from the next tick on, or none that a compiled tick could."""

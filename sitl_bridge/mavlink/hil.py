@@ -88,5 +88,8 @@ FRAME_LOCAL_NED = 1
 FRAME_BODY_FRD = 12
 SENSOR_ALL_FIELDS = 0x1FFF
 """HIL_SENSOR.fields_updated with every group of sensors."""
+ROTORS_STOP_AFTER = 0.3
+"""s of an autopilot's silence, in real time, after which the plant stops the rotors."""
+
 SENSOR_RESET = 1 << 31
 """HIL_SENSOR.fields_updated: the simulation, and with it every sensor, has begun afresh."""

@@ -81,7 +81,10 @@ class Network:
                 if name not in self.stalled:
                     times.append(endpoint.next_deadline())
             self.now = max(self.now, min(min(times), end))
-            for entry in sorted(entry for entry in arrivals if entry[0] <= self.now):
+            arrived = sorted(entry for entry in arrivals if entry[0] <= self.now)
+            if isinstance(self.autopilot, HilSession):  # as it is told by its loop
+                self.autopilot.expect([entry[3] for entry in arrived if entry[2] == "autopilot"][1:])
+            for entry in arrived:
                 self._flying.remove(entry)
                 getattr(self, entry[2]).receive(entry[3], self.now)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 
+from sitl_bridge.mavlink.hil import ROTORS_STOP_AFTER
 from sitl_bridge.plant.clocks.lateness import Lateness
 from sitl_bridge.plant.clocks.receiver import HilReceiver
 from sitl_bridge.plant.log.notices import Notices
@@ -16,7 +17,7 @@ from sitl_bridge.plant.physics.state import STOPPED, Array
 from sitl_bridge.plant.simulation import Simulation
 from sitl_bridge.plant.stages import Command
 
-AUTOPILOT_TIMEOUT = 0.3
+AUTOPILOT_TIMEOUT = ROTORS_STOP_AFTER
 """Silence after which the rotors stop, s."""
 
 
