@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from controller.design.names import FOR_ESTIMATES
-from controller.feedback.truth import Feedback, PathFrom, estimates
+from controller.feedback.truth import Feedback, PathFrom, TruthFeedback, estimates
 from controller.hil.backlog import Inlet
 from controller.hil.session import HilSession, Pilot, new_session
 from controller.pilot.autopilot import Autopilot
@@ -27,6 +27,7 @@ from sitl_bridge.vehicle.description import Vehicle
 
 if TYPE_CHECKING:
     from controller.feedback.assessment import Assessor
+    from controller.feedback.delay_watch import DelayWatch
     from controller.feedback.log import EstimateLog
     from controller.law.state import Array
     from controller.own_law.find import ChosenLaw
@@ -137,6 +138,8 @@ def open_session(options: ControllerOptions, speaker: Speaker) -> Session:
         design = FOR_ESTIMATES.get(design, design)
     elif None not in (options.path_from, options.out) and estimates(options.feedback, options.vehicle):
         log, feedback = _estimating_beside(options)
+    elif options.feedback == "truth":
+        feedback = TruthFeedback(_delay_watch(options))
     terms_log = None if options.out is None else TermsLog(options.out, options.logs)
     logs = tuple(each for each in (log, terms_log) if each is not None)
     instance, say, rate = options.instance, speaker.say, options.rate_hz
@@ -204,7 +207,16 @@ def _estimating_beside(options: ControllerOptions) -> tuple[EstimateLog, Feedbac
     assert options.out is not None
     log = EstimateLog(options.out, options.logs)
     beside = EstimateFeedback(options.vehicle, options.rate_hz, log)
-    return log, TruthBesideEstimate(beside, options.rate_hz)
+    return log, TruthBesideEstimate(beside, options.rate_hz, _delay_watch(options))
+
+
+def _delay_watch(options: ControllerOptions) -> DelayWatch | None:
+    """On truth; the paper's designs and laws of the user's own stay what they are, whatever the loop does."""
+    if options.law is not None or (options.path_from is not None and options.design not in FOR_ESTIMATES):
+        return None
+    from controller.feedback.delay_watch import DelayWatch
+
+    return DelayWatch(options.vehicle, options.rate_hz)
 
 
 def _loop(

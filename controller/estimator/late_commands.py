@@ -10,17 +10,25 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from controller.estimator.correct.live_samples import failed
 from controller.estimator.records import (
+    BODY_RATES_OUT,
     DELAY_HISTORY,
     DELAY_STEP,
     DELAYS,
+    FILTER,
     FLYING,
     GYROSCOPE,
+    MOST_ROTORS,
+    OUTPUT_SIZE,
     STANDING,
+    Array,
     Filter,
 )
-from sitl_bridge.compiled import kernel
+from sitl_bridge.compiled import Buffer, entry_point, kernel
+from sitl_bridge.ids import ACTUATOR_CONTROLS
 
 WINDOW = 10
 """Ticks from one turn to the next that it is compared with: a lasting moment (a weak rotor) is in both, and
@@ -37,11 +45,20 @@ BETTER = 0.15
 """Of the present delay's misfit: another has to leave less, or neither explains what is seen."""
 LEAST_CHANGE = 0.024
 """s; a smaller difference is within what gains bear."""
+LEAST_ON_TRUTH = 0.012
+"""s; likewise on truth, whose gains are stiffer and where commands that act late mislead what adapts."""
+NOISE_ON_TRUTH = 1e-3
+"""rad/s, standard deviation: rates without noise would make evidence of rounding."""
+CLEAR = 0.3
+"""m above its place on the ground: below it legs may have a part in how a vehicle turns."""
 
 
 @kernel
-def watch_delay(f: Filter, measured: Any, ticks: int) -> None:
-    """Take in a tick: gyroscope (3,), rad/s; ticks: so many since the one before."""
+def watch_delay(f: Filter, measured: Any, ticks: int, least_change: float) -> None:
+    """Take in a tick: gyroscope (3,), rad/s; ticks: so many since the one before.
+
+    least_change: s, by which another delay has to differ from the one reckoned with.
+    """
     p, m = f.p, f.m
     if m.vehicle_mode != FLYING or ticks != 1 or failed(f, GYROSCOPE):
         m.delay_ticks_watched = m.delay_ticks_compared = 0
@@ -69,11 +86,36 @@ def watch_delay(f: Filter, measured: Any, ticks: int) -> None:
         m.rates[here, axis] = measured[axis]
     m.delay_ticks_watched = n + 1
     if n >= 2 * WINDOW + LONGEST and p.command_delay + 2 * WINDOW < DELAY_HISTORY:
-        _compare(f, n)
+        _compare(f, n, least_change)
+
+
+@entry_point(
+    Buffer(FILTER, (1,)),
+    Buffer(np.float64, (OUTPUT_SIZE,)),
+    Buffer(np.float64, (ACTUATOR_CONTROLS,)),
+    Buffer(np.float64, (MOST_ROTORS,)),
+    int,
+)
+def watch_truth(record: Any, state: Array, controls: Array, largest_speed: Array, ticks: int) -> int:
+    """The same on truth: take in a tick and the controls (16,) with which it was answered.
+
+    Of the filter only parameters, commands and what belongs to the watch are used. state: (18,), eq. 31;
+    largest_speed: (16,), rad/s; ticks: since the tick before. Returns the delay that was found, -1: none.
+    """
+    f = record[0]
+    p, m = f.p, f.m
+    if m.vehicle_mode == FLYING and p.has_ground and state[2] < p.standing_height + CLEAR:
+        ticks = 0  # on the ground, or nearly: as if it had been missed
+    watch_delay(f, state[BODY_RATES_OUT : BODY_RATES_OUT + 3], ticks, LEAST_ON_TRUTH)
+    row = m.command_count % m.commands.shape[0]
+    for i in range(MOST_ROTORS):
+        m.commands[row, i] = controls[i] * largest_speed[i]
+    m.command_count += 1
+    return int(m.delay_found)
 
 
 @kernel
-def _compare(f: Filter, n: int) -> None:
+def _compare(f: Filter, n: int, least_change: float) -> None:
     """Add tick n to the misfit of each delay, and judge: all of them have seen the same ticks."""
     p, m = f.p, f.m
     kept = 1.0 - p.period / MEMORY_TIME if m.delay_ticks_compared > 0 else 0.0
@@ -99,7 +141,7 @@ def _compare(f: Filter, n: int) -> None:
     unit = 6.0 * p.sensor_std[GYROSCOPE] ** 2 * WINDOW
     if best == DELAYS - 1:
         return  # later still, or nothing of the kind: a backlog after a stall
-    far = abs(best * DELAY_STEP - p.command_delay) * p.period >= LEAST_CHANGE
+    far = abs(best * DELAY_STEP - p.command_delay) * p.period >= least_change
     if far and ours - least > EVIDENCE * unit and least < BETTER * ours:
         m.delay_found = best * DELAY_STEP
 

@@ -14,7 +14,7 @@ from controller.estimator.correct.pseudo_measurements import load_at_rest, on_gr
 from controller.estimator.correct.receiver_wander import fade_wander
 from controller.estimator.correct.sensors import accelerometer, barometer, gyroscope, magnetometer
 from controller.estimator.dropped_load import drop
-from controller.estimator.late_commands import watch_delay
+from controller.estimator.late_commands import LEAST_CHANGE, watch_delay
 from controller.estimator.predict.process import predict
 from controller.estimator.records import (
     ALIGNING,
@@ -128,7 +128,7 @@ def tick(record: Any, measurements: Any, out: Array) -> int:
     m.adrift = m.vehicle_mode == FLYING and silence > OUTAGE
     if given.has_imu:
         gyroscope(f, given.gyroscope)
-        watch_delay(f, given.gyroscope, ticks)
+        watch_delay(f, given.gyroscope, ticks, LEAST_CHANGE)
         accelerometer(f, given.accelerometer)
         watch(f, given.accelerometer)
     if given.has_magnetometer:

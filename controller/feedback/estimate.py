@@ -12,6 +12,7 @@ from controller.design.model import rotor_time_constant
 from controller.estimator.filter import Estimator
 from controller.estimator.records import X_LOAD, X_POSITION
 from controller.estimator.tuning import Tuning, from_sensors
+from controller.feedback.delay_watch import DelayWatch
 from controller.feedback.health_notices import HealthWatch
 from controller.feedback.log import EstimateLog
 from controller.feedback.truth import PathFrom, PlainTick, TruthFeedback
@@ -297,7 +298,8 @@ class EstimateFeedback:
 class TruthBesideEstimate(TruthFeedback):
     """The law flies on truth; the estimator runs beside it, for its log."""
 
-    def __init__(self, beside: EstimateFeedback, rate_hz: float) -> None:
+    def __init__(self, beside: EstimateFeedback, rate_hz: float, watch: DelayWatch | None = None) -> None:
+        super().__init__(watch)
         self._beside = beside
         self._patience = round(LONGEST_WAIT * rate_hz)
         self._begun = False
@@ -318,13 +320,16 @@ class TruthBesideEstimate(TruthFeedback):
 
     def note_command(self, controls: Array, armed: bool) -> None:
         """The estimator has to know."""
+        super().note_command(controls, armed)
         self._beside.note_command(controls, armed)
 
     def note_unheard(self, controls: Array | None) -> None:
         """Likewise."""
+        super().note_unheard(controls)
         self._beside.note_unheard(controls)
 
     def restart(self) -> None:
         """Align anew."""
+        super().restart()
         self._beside.restart()
         self._begun = False

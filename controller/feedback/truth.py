@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from controller.hil.answers import AnswerWriter
 from controller.hil.ticks import Tick, TickReader
@@ -13,6 +13,9 @@ from controller.law.reference import Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.description import Vehicle
 from sitl_bridge.vehicle.sensors import Sensors
+
+if TYPE_CHECKING:
+    from controller.feedback.delay_watch import DelayWatch
 
 PlainTick = Callable[[int, int, int, float], int]
 """Answers a datagram that the reader holds: (its length, time_usec of the tick before, the answer's sequence
@@ -60,24 +63,43 @@ class TruthFeedback:
 
     name = "truth"
     needs_truth = True
-    loop_delay: int | None = None
+
+    def __init__(self, watch: DelayWatch | None = None) -> None:
+        """watch: looks for commands that act later than told; None: nobody does."""
+        self.loop_delay: int | None = None
+        self._watch = watch
 
     def update(self, time_usec: int, tick: Tick, reader: TickReader) -> Array | None:
         """The state that the plant says it is in."""
-        return reader.estimate if tick.truth else None
+        if not tick.truth:
+            return None
+        if self._watch is not None:
+            self._watch.begin(time_usec, reader.estimate)
+            if self._watch.found >= 0:
+                self.loop_delay = self._watch.take()
+        return reader.estimate
 
     def note_command(self, controls: Array, armed: bool) -> None:
-        """Truth does not need to know."""
+        """Whoever looks for late commands has to know."""
+        if self._watch is not None:
+            self._watch.answered(controls, armed)
 
     def note_unheard(self, controls: Array | None) -> None:
-        """Nor this."""
+        """What the rotors turn the vehicle by in a silence says nothing of a delay."""
+        if self._watch is not None:
+            self._watch.unheard(controls)
 
     def plain_tick(self, reader: TickReader, law: Law, writer: AnswerWriter) -> PlainTick | None:
         """Datagram in, control step, answer out."""
-        return answer_truth.bind(*reader.buffers, *law, *writer.buffers)
+        answer: PlainTick = answer_truth.bind(*reader.buffers, *law, *writer.buffers)
+        watch = self._watch
+        return answer if watch is None else watch.watching(answer, reader, writer.controls)
 
     def restart(self) -> None:
-        """Nor does it remember."""
+        """Another flight begins."""
+        self.loop_delay = None
+        if self._watch is not None:
+            self._watch.restart()
 
     def path_from(self, path_from: PathFrom) -> PathFrom:
         """From where the load is."""

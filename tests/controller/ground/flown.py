@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.design.catalogue import Emphasis, guided_designs, on_cable
+from controller.feedback.delay_watch import DelayWatch
+from controller.feedback.truth import TruthFeedback
 from controller.ground.flight.guidance import Stage
 from controller.ground.link.peers import Address
 from controller.ground.station import Station
@@ -56,16 +58,20 @@ class Designer:
 class Flown:
     """One vehicle; has what `rig.Client` needs of a rig."""
 
-    def __init__(self, *overrides: str, vehicle: str = "iris") -> None:
+    def __init__(self, *overrides: str, vehicle: str = "iris", untold: tuple[str, ...] = ()) -> None:
+        """untold: overrides of which only the plant knows."""
         self.vehicle = load_vehicle(vehicle, overrides)
+        self.said: list[str] = []
         self.now = 100.0
         self.profile = profile_of(self.vehicle, 0, self.vehicle.ground is not None)
         self.station = Station(self.profile, self.now)
         self.clients: list[Client] = []
         self.every_tick: Callable[[], None] = lambda: None
         """Called before each tick"""
-        self.simulation = Simulation(self.vehicle, RATE_HZ, seed=1)
-        self.session = new_session(self._autopilot, 0, lambda text: None)
+        flown = load_vehicle(vehicle, [*overrides, *untold])
+        self.simulation = Simulation(flown, RATE_HZ, seed=1)
+        feedback = TruthFeedback(DelayWatch(self.vehicle, RATE_HZ))
+        self.session = new_session(self._autopilot, 0, self.said.append, feedback)
         self.clock = Lockstep(self.simulation, Notices(lambda text: None), 0)
         self.clock.start(self.now)
         self._track: list[list[float]] = []
