@@ -11,6 +11,7 @@ from controller.over.identify.excitation import PERIOD, PITCH, ROLL, THRUST, exc
 from controller.over.identify.fit import Series, fit_response, fit_thrust, response_at
 from controller.over.law import Setpoint
 from controller.over.stack import thrust_setpoint
+from sitl.command_line.commands import main
 
 FREQUENCIES = np.array(ROLL) / PERIOD
 
@@ -77,3 +78,11 @@ def test_uneven_samples_and_a_drift_do_not_matter() -> None:
     found = response_at(times, values, np.array([0.8, 1.3]))
     assert found[1] == pytest.approx(2.0 * np.exp(0.5j), abs=1e-6)
     assert abs(found[0]) < 1e-6
+
+
+@pytest.mark.parametrize(("flag", "value"), [("--steer", "attitude"), ("--baseline", "point")])
+def test_what_does_not_go_with_it_is_one_line(
+    flag: str, value: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", "--over", "udpin:127.0.0.1:1", flag, value]) == 2
+    assert f"{flag}: does not go with identify" in capsys.readouterr().err
