@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller.design.model import actuated_model, with_integrator
+from controller.design.softer_far_off import at_share, set_soft
 from controller.law.control_law import Design, Memory
 from controller.law.state import (
     LOAD_POSITION,
@@ -54,6 +55,8 @@ def acting_later(design: Design, vehicle: Vehicle, delay: int, loaded: bool = Tr
         gain = gain @ a
     later["state_gain"][0][:, states] = gain[:, :rigid]
     later["lag_gain"][0][:, : lagging - rigid] = gain[:, rigid:lagging]
+    if design["soft"]["far"][0] > 0.0:
+        set_soft(later, acting_later(at_share(design, 0.0), vehicle, delay, loaded))
     later["delay"] = delay
     later["lead_time"] += (delay - told) * period
     return later

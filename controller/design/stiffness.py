@@ -20,6 +20,8 @@ MARGIN = 0.032
 """s, of extra delay at each input and at all of them, at hover: 20 ms are borne along a fast motion, too."""
 LOOKED_AT = (1.0, 0.5, 0.0)
 """Shares of the margin at which the loop has to be stable."""
+BETWEEN = (0.5,)
+"""Shares of the stiff gains, on the way to soft ones, that are looked at as well."""
 FASTEST = 0.14
 """Lags of the rotors in the time constant with which leaning answers the load's velocity, at most."""
 HALVINGS = 4

@@ -21,6 +21,7 @@ from controller.law.adaptation import ADAPTATION, adapted
 from controller.law.flatness import BODY, STENCIL, flat_motion
 from controller.law.reference import path_derivatives
 from controller.law.rotations import into, out_of, set_frame
+from controller.law.schedule import GAINS, SIZED, SOFT, schedule
 from controller.law.state import (
     BODY_RATES,
     EULER_ANGLES,
@@ -56,6 +57,7 @@ DESIGN = np.dtype(
         ("hover_state", "f8", STATE_SIZE),  # hover with the load at the origin
         ("hover_wrench", "f8", WRENCH_SIZE),
         ("geometric", "i8"),  # 1: the errors are those of `geometric`, with the same gains
+        ("soft", SOFT),  # the gains far from the reference, see `schedule`
         ("adapts", "i8"),  # 1: it finds out what the description gets wrong
         ("body", BODY),
     ]
@@ -89,6 +91,9 @@ WORK = np.dtype(
         ("frame", "f8", (3, 3)),  # rows: x, y, z axes, in the world, of the model that the gains are for
         ("lines", "f8", (4, 3)),  # vectors of the world and the body
         ("turns", "f8", (3, 3, 3)),  # attitudes: as it is, of the reference, as commanded
+        ("moving", "f8", SIZED),  # the reference's own motion, as a deviation
+        ("gains", GAINS),  # for deviation and motion
+        ("integral_rate", "f8", 3),  # at which it is built up, over the usual one
         ("body", BODY),  # with what was found of it
         ("stencil", STENCIL),
     ]
@@ -185,16 +190,17 @@ def step(design: Any, memory: Any, path: Any, estimate: Array, work: Any) -> Non
     path: the reference, see `reference`; time runs from the step that engaged the law.
     """
     deviation(design, memory, path, memory.ticks * design.period, estimate, work)
+    schedule(design, work)
     integrate(design, memory, estimate, work)
     for k in range(WRENCH_SIZE):
         u = work.feedforward[k]
         work.terms[FEEDFORWARD_TERM, k] = u
         for i in range(STATE_SIZE):
-            u -= design.state_gain[k, i] * work.deviation[i]
+            u -= work.gains.state_gain[k, i] * work.deviation[i]
         work.terms[PROPORTIONAL, k] = u - work.feedforward[k]
         without_integral = u
         for axis in range(3):
-            u -= design.integral_gain[k, axis] * work.integral[axis]
+            u -= work.gains.integral_gain[k, axis] * work.integral[axis]
         work.terms[INTEGRAL, k] = u - without_integral
         work.wrench[k] = u
     count_under_way(design, memory, work)
@@ -209,7 +215,9 @@ def integrate(design: Any, memory: Any, estimate: Array, work: Any) -> None:
     for axis in range(3):
         error = estimate[design.controlled + axis] - work.reference[axis]
         if memory.ticks > 0:  # trapezoidal rule between the samples
-            memory.integral[axis] += 0.5 * design.period * (error + memory.last_error[axis])
+            memory.integral[axis] += (
+                work.integral_rate[axis] * 0.5 * design.period * (error + memory.last_error[axis])
+            )
         memory.last_error[axis] = error
         work.integral[axis] = memory.integral[axis]
     into(work.frame, work.integral)
@@ -222,9 +230,9 @@ def count_under_way(design: Any, memory: Any, work: Any) -> None:
     for k in range(WRENCH_SIZE):
         u = work.wrench[k]
         for j in range(WRENCH_SIZE):
-            u -= design.lag_gain[k, j] * memory.rotors[j]
+            u -= work.gains.lag_gain[k, j] * memory.rotors[j]
             for age in range(design.delay):
-                u -= design.past_gain[age, k, j] * memory.past[age, j]
+                u -= work.gains.past_gain[age, k, j] * memory.past[age, j]
         work.terms[DELAY, k] = u - work.wrench[k]
         work.wrench[k] = u
 
@@ -241,15 +249,15 @@ def _limit_lean(design: Any, work: Any) -> None:
         k, tilt = 1 + axis, FIRST_ANGLE + axis
         moment = 0.0
         for i in range(FIRST_RATE):
-            moment -= design.state_gain[k, i] * work.deviation[i]
+            moment -= work.gains.state_gain[k, i] * work.deviation[i]
         for i in range(3):
-            moment -= design.integral_gain[k, i] * work.integral[i]
-        asked[axis] = moment / design.state_gain[k, tilt]
+            moment -= work.gains.integral_gain[k, i] * work.integral[i]
+        asked[axis] = moment / work.gains.state_gain[k, tilt]
     size = math.sqrt(asked[0] ** 2 + asked[1] ** 2)
     beyond = max(0.0, 1.0 - design.largest_lean / size) if size > 0.0 else 0.0
     for axis in range(2):
         k, tilt = 1 + axis, FIRST_ANGLE + axis
-        asked[axis] *= beyond * design.state_gain[k, tilt]
+        asked[axis] *= beyond * work.gains.state_gain[k, tilt]
         work.wrench[k] -= asked[axis]
 
 
@@ -272,7 +280,7 @@ def remember(design: Any, memory: Any, work: Any) -> None:
             work.terms[SATURATED, k] -= work.held_back[k - 1]
     for axis in range(3):
         for k in range(WRENCH_SIZE):
-            work.integral[axis] += design.anti_windup[axis, k] * work.terms[SATURATED, k]
+            work.integral[axis] += work.gains.anti_windup[axis, k] * work.terms[SATURATED, k]
     out_of(work.frame, work.integral)
     for axis in range(3):
         memory.integral[axis] = work.integral[axis]

@@ -28,6 +28,7 @@ from typing import Any
 
 from controller.law.control_law import FIRST_ANGLE, FIRST_RATE, count_under_way, deviation, integrate
 from controller.law.rotations import cross, dot, from_angles, seen_from, set_frame, swung, turn_between
+from controller.law.schedule import schedule
 from controller.law.state import STATE_SIZE, WRENCH_SIZE, Array
 from controller.law.terms import DELAY, FEEDFORWARD_TERM, INTEGRAL, PROPORTIONAL
 from sitl_bridge.compiled import kernel
@@ -90,9 +91,9 @@ def _asked(design: Any, work: Any, k: int) -> float:
     """What places, velocities and the integral ask of an input."""
     out = 0.0
     for i in range(FIRST_RATE):
-        out -= design.state_gain[k, i] * work.deviation[i]
+        out -= work.gains.state_gain[k, i] * work.deviation[i]
     for i in range(3):
-        out -= design.integral_gain[k, i] * work.integral[i]
+        out -= work.gains.integral_gain[k, i] * work.integral[i]
     return out
 
 
@@ -103,8 +104,8 @@ def _commanded_direction(design: Any, work: Any, direction: Array) -> float:
     size = math.sqrt(dot(force, force))
     along = _asked(design, work, 0)
     # A moment about y that tilts the thrust by pitch leans it to x; one about x leans it to -y.
-    lean_x = _asked(design, work, 2) / design.state_gain[2, FIRST_ANGLE + 1]
-    lean_y = -_asked(design, work, 1) / design.state_gain[1, FIRST_ANGLE]
+    lean_x = _asked(design, work, 2) / work.gains.state_gain[2, FIRST_ANGLE + 1]
+    lean_y = -_asked(design, work, 1) / work.gains.state_gain[1, FIRST_ANGLE]
     forward = 0.0
     for i in range(3):
         direction[i] = (
@@ -119,8 +120,8 @@ def _commanded_direction(design: Any, work: Any, direction: Array) -> float:
     room = forward * math.tan(design.largest_lean)
     sideways = math.sqrt(sideways)
     share = room / sideways if sideways > room else 1.0
-    work.held_back[0] = (share - 1.0) * lean_y * design.state_gain[1, FIRST_ANGLE]
-    work.held_back[1] = (1.0 - share) * lean_x * design.state_gain[2, FIRST_ANGLE + 1]
+    work.held_back[0] = (share - 1.0) * lean_y * work.gains.state_gain[1, FIRST_ANGLE]
+    work.held_back[1] = (1.0 - share) * lean_x * work.gains.state_gain[2, FIRST_ANGLE + 1]
     commanded = math.sqrt(forward * forward + (share * sideways) ** 2)
     for i in range(3):
         direction[i] = (share * direction[i] + forward * turns[1, i, 2]) / commanded
@@ -141,6 +142,7 @@ def geometric_step(design: Any, memory: Any, path: Any, estimate: Array, work: A
     """One step: work.wrench = u for this estimate (18,), eq. 31; integrates the load's error into memory."""
     deviation(design, memory, path, memory.ticks * design.period, estimate, work)
     _cable_errors(estimate, work)
+    schedule(design, work)
     integrate(design, memory, estimate, work)
     actual, planned, commanded = work.turns[0], work.turns[1], work.turns[2]
     from_angles(estimate[15], estimate[16], estimate[17], actual)
@@ -162,7 +164,7 @@ def geometric_step(design: Any, memory: Any, path: Any, estimate: Array, work: A
     work.wrench[0] += projected - math.sqrt(dot(reference, reference))
     for k in range(1, WRENCH_SIZE):
         for i in range(FIRST_RATE, STATE_SIZE):
-            work.wrench[k] -= design.state_gain[k, i] * work.deviation[i]
+            work.wrench[k] -= work.gains.state_gain[k, i] * work.deviation[i]
     _turning_moment(design.body.inertia, estimate[FIRST_RATE:FIRST_ANGLE], gyro)
     for i in range(3):
         work.wrench[1 + i] += gyro[i]
@@ -173,6 +175,6 @@ def geometric_step(design: Any, memory: Any, path: Any, estimate: Array, work: A
         terms = work.terms
         terms[FEEDFORWARD_TERM, k], terms[INTEGRAL, k] = work.feedforward[k], 0.0
         for i in range(3):
-            terms[INTEGRAL, k] -= design.integral_gain[k, i] * work.integral[i]
+            terms[INTEGRAL, k] -= work.gains.integral_gain[k, i] * work.integral[i]
         asked = work.wrench[k] + (work.held_back[k - 1] if k == 1 or k == 2 else 0.0)
         terms[PROPORTIONAL, k] = asked - terms[FEEDFORWARD_TERM, k] - terms[INTEGRAL, k] - terms[DELAY, k]

@@ -22,7 +22,9 @@ def test_they_are_those_that_a_design_for_that_delay_has(vehicle: str, loaded: b
     found = acting_later(guided_designs(prompt, RATE_HZ)[which], prompt, 15, loaded)
     assert told.dtype.names is not None
     for name in told.dtype.names:
-        if name != "body":
+        if name == "soft":  # under ground control the gains are the soft ones anyway
+            assert found[name].tobytes() == told[name].tobytes()
+        elif name != "body":
             np.testing.assert_allclose(
                 found[name], told[name], rtol=1e-9, atol=1e-9 * np.abs(told[name]).max()
             )

@@ -58,15 +58,16 @@ def test_each_term_is_its_part_of_the_sum(off_m: float) -> None:
         error = estimate[LOAD_POSITION] - work["reference"][0]
         integral = before["integral"][0]
         if before["ticks"][0] > 0:
-            integral = integral + 0.5 / RATE_HZ * (error + before["last_error"][0])
-        terms, record = work["terms"][0], law[0]
+            rate = work["integral_rate"][0]
+            integral = integral + rate * 0.5 / RATE_HZ * (error + before["last_error"][0])
+        terms, gains = work["terms"][0], work["gains"][0]
         np.testing.assert_allclose(terms[FEEDFORWARD_TERM], work["feedforward"][0])
-        feedback = -record["state_gain"] @ work["deviation"][0]
+        feedback = -gains["state_gain"] @ work["deviation"][0]
         np.testing.assert_allclose(terms[PROPORTIONAL], feedback, rtol=1e-9, atol=1e-12)
         scale = np.abs(feedback).max()
-        integrated = -record["integral_gain"] @ integral
+        integrated = -gains["integral_gain"] @ integral
         np.testing.assert_allclose(terms[INTEGRAL], integrated, rtol=1e-9, atol=1e-12 * scale)
-        under_way = np.einsum("akj,aj->k", record["past_gain"][:2], past[:2]) + record["lag_gain"] @ rotors
+        under_way = np.einsum("akj,aj->k", gains["past_gain"][:2], past[:2]) + gains["lag_gain"] @ rotors
         np.testing.assert_allclose(terms[DELAY], -under_way, rtol=1e-9, atol=1e-12 * scale)
         commands = zip(vehicle.rotors, controls[: len(vehicle.rotors)], strict=True)
         thrusts = [rotor.thrust_coefficient * (c * rotor.max_speed) ** 2 for rotor, c in commands]
