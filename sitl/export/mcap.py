@@ -50,7 +50,8 @@ def _rows(times: Array, rate_hz: float) -> list[int]:
     """Indices of rows, at most so many a second on average, the first and the last among them."""
     if len(times) < 2:
         return list(range(len(times)))
-    step = max(1.0, 1.0 / (rate_hz * float(times[1] - times[0])))
+    spacing = float(times[-1] - times[0]) / (len(times) - 1)  # not the first: a log may begin with a burst
+    step = max(1.0, round(1.0 / (rate_hz * spacing), 9)) if spacing > 0.0 else 1.0
     return [*np.arange(0.0, len(times) - 1, step).round().astype(int).tolist(), len(times) - 1]
 
 

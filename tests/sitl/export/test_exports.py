@@ -16,6 +16,7 @@ from scipy.io import loadmat
 
 from controller.law.terms import TERM_COLUMNS
 from sitl.export.formats import WRITERS, export
+from sitl.export.mcap import _rows
 from sitl.recording.recording import RecordingError, read_recording
 from sitl_bridge.event_log import Event, EventLog
 from sitl_bridge.frames import LocalOrigin, attitude_to_ned_frd, enu_to_ned
@@ -165,3 +166,10 @@ def test_a_log_that_was_cut_off_still_has_its_sensors(tmp_path: Path) -> None:
     tlog.write_bytes(tlog.read_bytes()[:-30])
     log = ULog(str(export(tmp_path, "ulog")))
     assert any(data.name == "sensor_combined" for data in log.data_list)
+
+
+def test_a_log_that_begins_with_a_burst_keeps_its_rate() -> None:
+    """As sensors do in link.tlog: every tick until the vehicle is armed, then ten ticks a second."""
+    times = np.concatenate((0.004 * np.arange(8), 0.1 + 0.1 * np.arange(600)))
+    assert len(_rows(times, 20.0)) == len(times)
+    assert len(_rows(0.004 * np.arange(15000), 20.0)) == 1201
