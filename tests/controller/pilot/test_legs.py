@@ -128,11 +128,11 @@ def test_without_a_stay_the_next_leg_begins_without_a_jump(lag: float) -> None:
     assert flight.summary["settled"]
     for point in flight.summary["points"]:
         assert point["overshoot_pct"] < 0.5, point
-    jumps = np.abs(np.diff(flight.states["cable_tension_N"]))
+    bends = np.abs(np.diff(flight.states["cable_tension_N"], n=2))  # what is left of a motion is a slope
     load = np.stack([flight.states[f"load_{axis}_m"] for axis in "xyz"], axis=1)
     for before, point in itertools.pairwise(flight.summary["points"]):
         tick = round(point["set_at_s"] * RATE_HZ)
-        assert jumps[tick - 1 : tick + 5].max() < 1e-3  # of 98 N
+        assert bends[tick - 2 : tick + 5].max() < 1e-3  # of 98 N
         assert np.linalg.norm(load[tick] - before["position_m"]) < 5e-3 * before["step_m"]
 
 
