@@ -23,6 +23,9 @@ from sitl_bridge.vehicle.description import Vehicle
 STENCIL_STEP = 2e-3
 """Spacing of the central differences, s."""
 
+LEAST_PULL = 1e-3
+"""Of the load's weight, upwards: planned motions but those that begin with a slack cable keep far above."""
+
 LAGS_TO_REST = 30.0
 """Time constants of the cable after which its stretch is that of hover, to the last digits."""
 
@@ -103,7 +106,7 @@ def _planned_length(b: Any, path: Any, t: float, now: Any, planned: Any) -> floa
     lag, planned_lag, ramp_time = b.damping / b.stiffness, path.cable_lag / b.pace, path.ramp_time / b.pace
     # Between the planned lags: a parabola over their ratio's logarithm.
     ratio = min(max(math.log(lag / planned_lag) / math.log(OTHER_LAGS[2]), -1.5), 1.5) if lag > 0.0 else -1.5
-    share = max(0.0, t) / ramp_time
+    share = (t if path.departs else max(0.0, t)) / ramp_time
     piece = piece_at(path.pieces, min(1.0, share))
     stretch = 0.0
     for i in range(3):
@@ -133,6 +136,8 @@ def _tension(b: Any, r: Array, mass: float, pace: float, pull: Array) -> tuple[f
         velocity, acceleration, jerk = pace * r[1, i], pace**2 * r[2, i], pace**3 * r[3, i]
         upward = acceleration + (b.gravity if i == 2 else 0.0)
         pull[i] = mass * upward + drag * velocity
+        if i == 2:  # a cable that is about to pull has a direction
+            pull[i] = max(pull[i], LEAST_PULL * mass * b.gravity)
         squared += pull[i] * pull[i]
         pulling = mass * jerk + drag * acceleration + gaining * velocity
         bending = mass * pace**4 * r[4, i] + drag * jerk + 2.0 * gaining * acceleration

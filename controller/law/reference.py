@@ -57,6 +57,8 @@ PATH = np.dtype(
             "f8",
             (MOST_PIECES, PIECE_ORDER),
         ),  # share of the way, in powers of the share of the piece
+        ("departs", "i8"),  # 1: it leaves from a state that is not at rest
+        ("departure", "f8", (3, MOST_PIECES, PIECE_ORDER)),  # m, on top of the profile, of x, y, z, likewise
         ("slower", "f8", (3, 2)),  # longer ramp, in shares, for what is found to be less and more, see `pace`
         ("cable_lag", "f8"),  # s, of the cable's length behind its tension; 0: `lengths` is not given
         (
@@ -262,6 +264,18 @@ def profile(path: Any, share: float, out: Array) -> None:
 
 
 @kernel
+def _add_departure(path: Any, share: float, out: Array) -> None:
+    """Add what is left of the initial state at a share of the ramp time, a little below 0 too: out (6, 3)."""
+    piece = piece_at(path.pieces, share)
+    x = share * path.pieces - piece
+    for i in range(3):
+        scale = 1.0
+        for k in range(DERIVATIVES + 1):
+            out[k, i] += scale * derivative(path.departure[i, piece], x, k)
+            scale *= path.pieces / path.ramp_time
+
+
+@kernel
 def feasible(path: Any, t: float, out: Array, scratch: Array) -> None:
     """The path, left smoothly from its start: row k of out (6, 3) is the k-th derivative at time t (s).
 
@@ -288,3 +302,5 @@ def feasible(path: Any, t: float, out: Array, scratch: Array) -> None:
                 value += _BINOMIAL[n, k] * scratch[k] * out[n - k, i]
             out[n, i] = value
         out[0, i] += path.start[i]
+    if path.departs:
+        _add_departure(path, t / path.ramp_time, out)

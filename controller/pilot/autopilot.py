@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -90,7 +91,7 @@ class Autopilot:
     def step(self, estimate: Array, time_usec: int, now: float) -> None:
         """One control step on an estimate (18,), eq. 31; the first one arms and engages the law."""
         if self._step is None:
-            path = planned_from(self._path_from, estimate, self._motion.planned)
+            path = planned_from(self._path_from, estimate, partial(self._motion.planned, estimate=estimate))
             self.legs.begin(time_usec)
             memory = engaged_memory(estimate[LOAD_POSITION])
             work = np.zeros(1, dtype=WORK)

@@ -32,40 +32,45 @@ def cable_lag(cable: Cable) -> float:
     return lag if lag >= SHORTEST_LAG else 0.0
 
 
-def planned_lengths(tension: Array, duration: float, cable: Cable) -> Array:
+def planned_lengths(tension: Array, duration: float, cable: Cable, first: float | None = None) -> Array:
     """Lengths, m, as pieces (3, MOST_PIECES, 8) over equal shares of the duration (s), in rising powers.
 
     They are for cables with `OTHER_LAGS` times the lag.
 
     tension: (SAMPLES,), N, evenly spaced; at both ends it has been constant, and remains so. The length is
     the solution of F = k (l - l0) + c l', as a spline that begins at rest and ends in the decay that follows.
+    first: the length with which it begins, m, if that is not at rest.
     """
     steady = cable.rest_length + tension / cable.stiffness
     lag = cable.damping / cable.stiffness
-    return np.array([_lagging_pieces(steady, duration, lag * other) for other in OTHER_LAGS])
+    return np.array([_lagging_pieces(steady, duration, lag * other, first) for other in OTHER_LAGS])
 
 
-def _lagging_pieces(steady: Array, duration: float, lag: float) -> Array:
+def _lagging_pieces(steady: Array, duration: float, lag: float, first: float | None) -> Array:
     """Pieces (MOST_PIECES, 8) of what follows steady (SAMPLES,) with a lag, s."""
     from scipy.interpolate import BSpline, PPoly
 
-    length = lagging(steady, duration / (SAMPLES - 1), lag)
+    length = lagging(steady, duration / (SAMPLES - 1), lag, first)
     columns, at_end = _columns()
     coefficients = np.zeros(columns.shape[1])
-    coefficients[:_JOINED] = steady[0]
+    joined = _JOINED if first is None else 1
+    coefficients[:joined] = length[0]
     rate = duration / lag
     rest = length[-1] - steady[-1] if rate < _FASTEST_DECAY * MOST_PIECES else 0.0
     decay = rest * (-rate) ** np.arange(float(_JOINED))
     coefficients[-_JOINED:] = steady[-1] + np.linalg.solve(at_end, decay)
-    free = slice(_JOINED, len(coefficients) - _JOINED)
+    free = slice(joined, len(coefficients) - _JOINED)
     found, *_ = np.linalg.lstsq(columns[:, free], length - columns @ coefficients, rcond=None)
     coefficients[free] = found
     pieces = PPoly.from_spline(BSpline(_KNOTS, coefficients, _DEGREE)).c[::-1, _DEGREE:-_DEGREE].T
     return np.asarray(pieces * MOST_PIECES ** -np.arange(float(PIECE_ORDER)))
 
 
-def lagging(steady: Array, spacing: float, lag: float) -> Array:
-    """What follows steady (n, …) with a lag, s: exact for what is linear between the samples."""
+def lagging(steady: Array, spacing: float, lag: float, first: float | None = None) -> Array:
+    """What follows steady (n, …) with a lag, s: exact for what is linear between the samples.
+
+    first: with what it begins, if that is not the first of steady.
+    """
     if lag <= 0.0:
         return steady
     decay = math.exp(-spacing / lag)
@@ -74,7 +79,8 @@ def lagging(steady: Array, spacing: float, lag: float) -> Array:
     powers = decay ** np.arange(float(len(steady)))
     order = np.arange(len(steady))
     past = np.tril(powers[np.abs(order[:, None] - order)])
-    return np.asarray(past @ np.concatenate([steady[:1], driven]))
+    begun = steady[:1] if first is None else np.full_like(steady[:1], first)
+    return np.asarray(past @ np.concatenate([begun, driven]))
 
 
 @lru_cache(maxsize=1)

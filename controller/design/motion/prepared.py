@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from controller.design.motion.departure import begins_as_described, departing
 from controller.design.motion.ramp import Demand, demand, planned
 from controller.law.reference import Path
+from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
 
@@ -34,16 +36,25 @@ class PreparedMotion:
 
         estimated: it is flown on the estimate.
         """
-        self._vehicle, self._estimated = vehicle, estimated
+        self._vehicle, self._estimated, self._described = vehicle, estimated, True
         self._prepared = self._plan(expected)
 
-    def planned(self, path: Path) -> Path:
-        """The path (1,) as planned beforehand if it starts close to the expected place, else planned now."""
+    def planned(self, path: Path, estimate: Array | None = None) -> Path:
+        """The path (1,) as planned beforehand if it starts close to the expected place, else planned now.
+
+        estimate: (18,), eq. 31, as it starts; without one it starts as described.
+        """
+        if estimate is not None and not begins_as_described(self._vehicle, estimate):
+            self._described = False
+            if self._prepared["departs"][0]:
+                return self._plan(path)
         out = adapted(self._prepared, path, self._vehicle)
         return self._plan(path) if out is None else out
 
     def _plan(self, path: Path) -> Path:
-        return planned(path, self._vehicle, self._estimated)
+        out = planned(path, self._vehicle, self._estimated)
+        # What an estimator knows at the start is not enough to plan from.
+        return departing(out, self._vehicle) if self._described and not self._estimated else out
 
 
 def adapted(prepared: Path, path: Path, vehicle: Vehicle) -> Path | None:
@@ -55,7 +66,7 @@ def adapted(prepared: Path, path: Path, vehicle: Vehicle) -> Path | None:
         out[name] = path[name]
     if np.array_equal(prepared["start"], path["start"]):
         return out
-    if prepared["pieces"][0] == 0 or _way(path) < SHORTEST_WAY * _way(prepared):
+    if prepared["departs"][0] or prepared["pieces"][0] == 0 or _way(path) < SHORTEST_WAY * _way(prepared):
         return None
     vehicle, duration = linearised(vehicle), float(prepared["ramp_time"][0])
     before = _asked(prepared, vehicle)

@@ -19,6 +19,7 @@ from controller.design.motion.limits import Limits, limits_of
 from controller.design.motion.slower import slower
 from controller.design.motion.straight_line import StraightLine, drag_force
 from controller.design.remembered import remembered
+from controller.law.flatness import LEAST_PULL
 from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised
@@ -61,6 +62,8 @@ class Demand(NamedTuple):
     """N, of the rotor that gives most, over what it gives at full speed."""
     tension: float
     """N, the least."""
+    least_thrust: float
+    """Of the rotor that gives least, likewise."""
 
 
 @remembered(64)
@@ -87,7 +90,7 @@ def smoothly_planned(path: Path, vehicle: Vehicle) -> Path:
     hurried = not path["unhurried"][0]
     limits = limits_of(vehicle, float(path["agility"][0]) if hurried else GENTLE, estimated=not hurried)
     relaxation = vehicle.cable.damping / vehicle.cable.stiffness
-    low = max(SHORTEST_RAMP + 10.0 * _slowest_rotor(vehicle), RELAXATIONS * relaxation)
+    low = max(SHORTEST_RAMP + 10.0 * slowest_rotor(vehicle), RELAXATIONS * relaxation)
     high = LONGEST_RAMP
     if _within(out, vehicle, low, limits):
         high = low
@@ -103,33 +106,36 @@ def _plan_step(path: Path, vehicle: Vehicle, limits: Limits) -> None:
     way = path["centre"][0] - path["start"][0]
     if not way.any():
         return
-    shortest = SHORTEST_STEP + 3.0 * _slowest_rotor(vehicle)
+    shortest = SHORTEST_STEP + 3.0 * slowest_rotor(vehicle)
     motion = fastest(StraightLine(vehicle, way, limits), shortest)
     path["ramp_time"], path["pieces"], path["profile"] = motion.duration, len(motion.pieces), motion.pieces
     path["slower"] = slower(vehicle, way, limits, motion.shares, motion.duration)
     lag = cable_lag(vehicle.cable)
     if lag > 0.0:
         times = np.linspace(0.0, motion.duration, SAMPLES)
-        _, velocity, acceleration = _motion(path, motion.duration, times)
-        tension = np.linalg.norm(_pull(vehicle, velocity, acceleration), axis=1)
+        _, velocity, acceleration = motion_of(path, motion.duration, times)
+        tension = np.linalg.norm(cable_pull(vehicle, velocity, acceleration), axis=1)
         path["cable_lag"], path["lengths"] = lag, planned_lengths(tension, motion.duration, vehicle.cable)
 
 
 def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Demand:
     """What the path asks for over the times (n,), s, evenly spaced, if its ramp takes `ramp_time` s."""
-    load, velocity, acceleration = _motion(path, ramp_time, times)
+    load, velocity, acceleration = motion_of(path, ramp_time, times)
     gravity = np.array([0.0, 0.0, vehicle.gravity])
-    pull = _pull(vehicle, velocity, acceleration)
+    pull = cable_pull(vehicle, velocity, acceleration)
     tension = np.linalg.norm(pull, axis=1)
     spacing = float(times[1] - times[0])
     steady = vehicle.cable.rest_length + tension / vehicle.cable.stiffness
-    length = lagging(steady, spacing, float(path["cable_lag"][0]))
-    position = load + (length / np.maximum(tension, 1e-9))[:, None] * pull
+    first = float(path["lengths"][0, 1, 0, 0]) if path["departs"][0] else None
+    length = lagging(steady, spacing, float(path["cable_lag"][0]), first)
+    up = np.maximum(pull, [-np.inf, -np.inf, LEAST_PULL * vehicle.load.mass * vehicle.gravity])
+    position = load + (length / np.linalg.norm(up, axis=1))[:, None] * up
     own = (position[2:] - 2.0 * position[1:-1] + position[:-2]) / spacing**2
     drag = drag_force(vehicle.airframe.drag, (position[2:] - position[:-2]) / (2.0 * spacing))
     force = vehicle.airframe.mass * (own + gravity) + pull[1:-1] + drag
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), force[:, 2])
-    return Demand(float(tilt.max()), _rotor_share(vehicle, force, spacing), float(pull[:, 2].min()))
+    share = _rotor_shares(vehicle, force, spacing)
+    return Demand(float(tilt.max()), float(share.max()), float(pull[:, 2].min()), float(share.min()))
 
 
 def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
@@ -138,8 +144,8 @@ def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
     return demand(path, vehicle, 0.0, np.linspace(0.0, 2.0 * math.pi / rate, _SAMPLES))
 
 
-def _rotor_share(vehicle: Vehicle, force: Array, spacing: float) -> float:
-    """Largest thrust of a rotor over its own at full speed, for the forces (n, 3), N, every `spacing` s.
+def _rotor_shares(vehicle: Vehicle, force: Array, spacing: float) -> Array:
+    """Thrust of each rotor over its own at full speed (rotors, n), for forces (n, 3), N, every `spacing` s.
 
     The moments are those of the attitude's acceleration. Lagging rotors are asked for more, ahead of time.
     """
@@ -152,10 +158,10 @@ def _rotor_share(vehicle: Vehicle, force: Array, spacing: float) -> float:
     wrench += lag * np.gradient(wrench, spacing, axis=1)
     given = np.linalg.pinv(rotor_effect(vehicle.rotors)) @ wrench
     most = np.array([rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors])
-    return float((given / most[:, None]).max())
+    return np.asarray(given / most[:, None])
 
 
-def _pull(vehicle: Vehicle, velocity: Array, acceleration: Array) -> Array:
+def cable_pull(vehicle: Vehicle, velocity: Array, acceleration: Array) -> Array:
     """The cable's pull (n, 3), N, on a load that moves like this (n, 3), m/s and m/s²."""
     weightless = vehicle.load.mass * (acceleration + np.array([0.0, 0.0, vehicle.gravity]))
     return np.asarray(weightless + drag_force(vehicle.load.drag, velocity))
@@ -179,12 +185,12 @@ def _within(path: Path, vehicle: Vehicle, ramp_time: float, limits: Limits) -> b
     )
 
 
-def _slowest_rotor(vehicle: Vehicle) -> float:
+def slowest_rotor(vehicle: Vehicle) -> float:
     """s, the longest time constant of a rotor."""
     return max(rotor.time_constant for rotor in vehicle.rotors)
 
 
-def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:
+def motion_of(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, Array]:
     """Position (n, 3), m, velocity and acceleration of the feasible path at the times (n,)."""
     start = path["start"][0]
     away = _of_path(path, times)
@@ -192,11 +198,17 @@ def _motion(path: Path, ramp_time: float, times: Array) -> tuple[Array, Array, A
     if ramp_time <= 0.0:
         return start + away[0], away[1], away[2]
     w = [share[:, None] / ramp_time**order for order, share in enumerate(_shares(path, times / ramp_time))]
-    return (
+    place, velocity, acceleration = (
         start + w[0] * away[0],
         w[1] * away[0] + w[0] * away[1],
         w[2] * away[0] + 2.0 * w[1] * away[1] + w[0] * away[2],
     )
+    if path["departs"][0]:
+        shares = np.clip(times / ramp_time, 0.0, 1.0)
+        for axis, pieces in enumerate(path["departure"][0]):
+            for order, of_it in enumerate((place, velocity, acceleration)):
+                of_it[:, axis] += _derivative(pieces, shares, order) / ramp_time**order
+    return place, velocity, acceleration
 
 
 def _of_path(path: Path, times: Array) -> Array:

@@ -17,6 +17,7 @@ from sitl.studies.paper.flights import Pilot
 from sitl.studies.paper.record import Ledger
 from sitl.studies.paper.sections import (
     beyond,
+    beyond_starts,
     circling,
     elasticity,
     hover,
@@ -48,7 +49,7 @@ SECTIONS: tuple[tuple[str, Callable[[Context], str]], ...] = (
 )
 
 
-FLIGHTS = (position.requests, circling.requests, elasticity.requests, beyond.requests)
+FLIGHTS = (position.requests, circling.requests, elasticity.requests, beyond.requests, beyond_starts.requests)
 """What flies besides the hover, in the order in which it is needed."""
 
 

@@ -41,7 +41,7 @@ from sitl.studies.paper.drawings.beyond import draw_steps
 from sitl.studies.paper.flights import Flight
 from sitl.studies.paper.page import Cell
 from sitl.studies.paper.record import CORRECTED, UNSUPPORTED, Ledger
-from sitl.studies.paper.sections import beyond_loop
+from sitl.studies.paper.sections import beyond_loop, beyond_starts
 
 __all__ = ["requests", "section"]
 
@@ -50,7 +50,7 @@ def section(context: Context) -> str:
     """The section's content."""
     context.say("beyond the paper: every law, with and without mismatch, on other cables")
     ledger, quick = context.ledger, context.quick
-    context.pilot.ask(requests(quick))
+    context.pilot.ask([*requests(quick), *beyond_starts.requests(quick)])
     return (
         page.text(
             "The paper ends with what it leaves open: gain scheduling or a nonlinear controller for "
@@ -65,6 +65,7 @@ def section(context: Context) -> str:
         + _steps(context)
         + beyond_loop.table(ledger, LAWS)
         + _circles(context)
+        + beyond_starts.section(context)
         + _noise(context)
         + _cables(context)
     )
