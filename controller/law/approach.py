@@ -62,12 +62,16 @@ def _approach_speed(away: float, braking: float, decay: float) -> float:
 
 
 @kernel
-def _towards(way: Triple, speed: float, limits: Any, decay: float) -> Triple:
-    """Velocity along a way (m) that is left, at most `speed`."""
+def _towards(way: Triple, speed: float, climb: float, limits: Any, decay: float) -> Triple:
+    """Velocity along a way (m) that is left, at most `speed`.
+
+    climb: m/s upwards, at which the target moves itself; the limits are for both together.
+    """
     away = _size(way)
     if away == 0.0:
         return (0.0, 0.0, 0.0)
-    vertical = limits.up if way[2] > 0.0 else limits.down
+    vertical, own = (limits.up, climb) if way[2] > 0.0 else (limits.down, -climb)
+    vertical = min(vertical, max(vertical - own, LEAST_CLOSING_SPEED * vertical))
     most = min(speed, vertical * away / max(abs(way[2]), 1e-9))
     share = min(most, _approach_speed(away, BRAKING_SHARE * limits.acceleration, decay)) / away
     return (way[0] * share, way[1] * share, way[2] * share)
@@ -83,12 +87,30 @@ def _wanted(guide: Any) -> Triple:
         z = 0.0 if math.isnan(target[2]) else -here[2]
         own = _size((guide.base[1, 0], guide.base[1, 1], guide.base[1, 2]))
         speed = max(limits.speed - own, LEAST_CLOSING_SPEED * limits.speed)
-        return _towards((x, y, z), speed, limits, CLOSING)
+        return _towards((x, y, z), speed, guide.base[1, 2], limits, CLOSING)
     x, y, z = target[0] - here[0], target[1] - here[1], target[2] - here[2]
     if guide.kind == LANDING:
-        x, y, _ = _towards((x, y, 0.0), limits.speed, limits, APPROACH)
+        x, y, _ = _towards((x, y, 0.0), limits.speed, 0.0, limits, APPROACH)
         return (x, y, -guide.speed)
-    return _towards((x, y, z), guide.speed, limits, APPROACH)
+    return _towards((x, y, z), guide.speed, 0.0, limits, APPROACH)
+
+
+@kernel
+def _kept_above(guide: Any, step: float) -> float:
+    """The upward change of the carrot's velocity (m/s) in a period, raised so that the floor is kept.
+
+    The motion is seen through a positive window from the whole carrot, that of the base and that of the gap:
+    it stays above the floor where the whole carrot does. So this one brakes in time, whatever is asked for.
+    """
+    height, climb, driven = guide.carrot[0, 2] - guide.limits.floor, guide.carrot[1, 2], 0.0
+    for k in range(BASE):
+        height += guide.ahead[k] * guide.base[k, 2]
+        climb += guide.ahead[k] * guide.base[k + 1, 2] if k + 1 < BASE else 0.0
+        driven += guide.ahead[k] * guide.base[k + 2, 2] if k + 2 < BASE else 0.0
+    braking = BRAKING_SHARE * guide.limits.acceleration
+    least = -_approach_speed(max(0.0, height), braking, APPROACH)
+    planned = climb + guide.period * driven + step
+    return float(step + max(0.0, min(least, climb + guide.period * guide.limits.total) - planned))
 
 
 @kernel
@@ -104,6 +126,8 @@ def _move_carrot(guide: Any) -> None:
     )
     for i in range(3):
         step = dt * (both[i] - own[i])
+        if i == 2 and guide.kind != LANDING:
+            step = _kept_above(guide, step)
         carrot[2, i] = step / dt
         carrot[0, i] += dt * (carrot[1, i] + 0.5 * step)
         carrot[1, i] += step

@@ -22,6 +22,7 @@ LIMITS = np.dtype(
         ("speed", "f8"),  # m/s, horizontal, where a target has none of its own
         ("up", "f8"),  # m/s
         ("down", "f8"),  # m/s
+        ("floor", "f8"),  # m, below which nothing but a landing sinks; -inf: none
     ]
 )
 

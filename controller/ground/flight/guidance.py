@@ -176,6 +176,11 @@ class Guidance:
         hover = self._parameters["MPC_THR_HOVER"]
         return isinstance(setpoint, Attitude) and setpoint.thrust > _LIFTING * hover
 
+    def floor(self, body: Body, view: VehicleView) -> float:
+        """Least height of a body that is flown, m ENU; -inf for one that takes off or lands."""
+        flies = self.stage is Stage.FLYING and body is controlled_body(view)
+        return self.in_flight.floor(view) if flies else -math.inf
+
     # Where to go now
 
     def target(self, view: VehicleView, setpoint: Setpoint | Attitude | None, last: Target) -> Target:

@@ -133,6 +133,10 @@ class InFlight:
         speed = limited_speed(self._hover.speed, self._parameters)
         return Goto(self._hover.body, self._hover.point, self._hover.yaw, speed)
 
+    def floor(self, view: VehicleView) -> float:
+        """Least height of the controlled body, m ENU; -inf without a ground."""
+        return self._following.floor(view)
+
     def without_load(self) -> None:
         """The vehicle holds, and returns, where it would have been above the load."""
         self._hover.without_load()

@@ -133,7 +133,7 @@ class GuidedLaws:
             self._engage(body)
         if body is not target.body:
             target = self._pull(target, moment.view)
-        self._trajectory.aim(target, self._limits())
+        self._trajectory.aim(target, self._limits(target, moment.view))
         self._step()
 
     def go_on(self) -> None:
@@ -216,7 +216,7 @@ class GuidedLaws:
         )
         self._step = control_step.bind(*self._arrays, self.estimate, self._controls)
 
-    def _limits(self) -> Limits:
+    def _limits(self, target: Goto | Follow | Land, view: VehicleView) -> Limits:
         p = self._station.parameters
         total = min(p["MPC_ACC_HOR_MAX"], self._most_acceleration)
         return Limits(
@@ -225,6 +225,7 @@ class GuidedLaws:
             p["MPC_XY_VEL_MAX"],
             p["MPC_Z_VEL_MAX_UP"],
             p["MPC_Z_VEL_MAX_DN"],
+            self._station.machine.guidance.floor(target.body, view),
         )
 
     # Gains, and the cable that they are for

@@ -40,6 +40,8 @@ class Limits(NamedTuple):
     """m/s"""
     down: float
     """m/s"""
+    floor: float = -math.inf
+    """m, below which nothing but a landing sinks"""
 
 
 def motion_pole(length: float, gravity: float) -> float:

@@ -131,6 +131,33 @@ def test_velocities_at_random_keep_the_load_off_the_ground(seed: int) -> None:
     assert flight.flown(10.0).load[:, 2].min() > 0.5 * flight.station.parameters["LND_CLEARANCE"]
 
 
+@pytest.mark.parametrize("released", [False, True])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_set_points_whose_parts_contradict_each_other_keep_it_off_the_ground(
+    seed: int, released: bool
+) -> None:
+    flight, client = flying()
+    chance = random.Random(seed)
+    if released:
+        assert client.command(211, 1, 0).result == 0
+        flight.run(3.0)
+    setpoint(client, NAN, NAN, NAN, 0.0, 0.0, 0.0, *[NAN] * 3, target=(1, 1))
+    flight.run(0.1)
+    assert client.command(176, 1, 6, 0).result == 0
+    for _ in range(25):
+        numbers = [
+            reach * chance.uniform(-1, 1) if chance.random() < 0.7 else NAN
+            for reach in (20.0, 20.0, 8.0, 10.0, 10.0, 10.0, 5.0, 5.0, 5.0)
+        ]
+        for _ in range(chance.randrange(1, 20)):
+            setpoint(client, *numbers, target=chance.choice([LOAD, (1, 1)]))
+            flight.run(0.1)
+    assert flight.station.machine.mode.name == "OFFBOARD", client.texts()
+    way = flight.flown(20.0)
+    lowest = (way.vehicle if released else way.load)[:, 2].min()
+    assert lowest > 0.5 * flight.station.parameters["LND_CLEARANCE"]
+
+
 @pytest.mark.parametrize("factor", [1e-3, 0.1, 10.0, 1e3])
 def test_whatever_weights_are_set_in_flight_it_goes_on_flying(factor: float) -> None:
     """Weights whose gains do not carry the vehicle are refused with a reason."""

@@ -210,3 +210,60 @@ def test_the_vehicles_share_of_a_reversal_stays_small_on_any_cable(length: float
         motion = trajectory.path["motion"][0]
         worst = max(worst, abs(float(motion[2, 0] + length / 9.81 * motion[4, 0])))
     assert worst < 3.0 * LIMITS.acceleration
+
+
+FLOOR = 1.0
+
+
+def anything(chance: random.Random) -> Goto | Follow:
+    """A target above or below the floor, whose parts need not fit each other."""
+    place = (chance.uniform(-20, 20), chance.uniform(-20, 20), chance.uniform(-5, 8))
+    if chance.random() < 0.3:
+        return Goto(Body.LOAD, place, 0.0, chance.uniform(0.5, 6))
+    velocity, acceleration = (
+        tuple(math.nan if chance.random() < 0.3 else reach * chance.uniform(-1, 1) for reach in reaches)
+        for reaches in ((6.0, 6.0, 1.5), (4.0, 4.0, 4.0))
+    )
+    position = (*place[:2], math.nan if chance.random() < 0.5 else place[2])
+    return Follow(Body.LOAD, position, velocity, acceleration, 0.0, math.nan)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_target_takes_the_motion_below_the_floor(seed: int) -> None:
+    chance = random.Random(seed)
+    trajectory = Trajectory(PERIOD)
+    trajectory.start(np.array((0.0, 0.0, 4.0)), np.zeros(3), 0.0)
+    limits = LIMITS._replace(floor=FLOOR)
+    lowest = math.inf
+    for _ in range(30):
+        target = anything(chance)
+        for k in range(chance.randrange(1, 400)):
+            trajectory.advance(target, limits, k * PERIOD)
+            lowest = min(lowest, float(trajectory.path["motion"][0, 0, 2]))
+    assert lowest > FLOOR - 0.02
+
+
+def test_a_floor_does_not_hold_up_a_landing_or_a_climb_from_below() -> None:
+    limits = LIMITS._replace(floor=FLOOR)
+    down, up = started(), started()
+    for k in range(2000):
+        down.advance(Land(Body.LOAD, (0.0, 0.0, 0.0), 0.0, 0.5), limits, k * PERIOD)
+        up.advance(Goto(Body.LOAD, (0.0, 0.0, 3.0), 0.0, 2.0), limits, k * PERIOD)
+    assert down.path["motion"][0, 0, 2] < -2.0
+    assert up.path["motion"][0, 0, 2] == pytest.approx(3.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("way", "most"), [(8.0, LIMITS.up), (-8.0, LIMITS.down)])
+def test_a_set_point_that_climbs_or_sinks_itself_is_closed_to_within_the_same_limit(
+    way: float, most: float
+) -> None:
+    """Its own velocity and what closes the gap to it are limited together."""
+    own = math.copysign(0.6 * most, way)
+    trajectory, fastest = started(), 0.0
+    for k in range(1500):
+        if k % 25 == 0:
+            place = (0.0, 0.0, way + own * k * PERIOD)
+            target = Follow(Body.LOAD, place, (0.0, 0.0, own), NAN3, 0.0, math.nan)
+        trajectory.advance(target, LIMITS, k * PERIOD)
+        fastest = max(fastest, abs(float(trajectory.path["motion"][0, 1, 2])))
+    assert 0.95 * most < fastest < 1.01 * most
