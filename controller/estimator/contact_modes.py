@@ -20,6 +20,7 @@ from controller.estimator.records import (
     FORCE,
     GPS_POSITION,
     GPS_VELOCITY,
+    GYROSCOPE,
     LOAD,
     LOAD_DROPPED,
     LOAD_ON_CABLE,
@@ -27,6 +28,7 @@ from controller.estimator.records import (
     LOAD_RELEASED,
     LOAD_VELOCITY,
     POSITION,
+    RATES,
     STANDING,
     VELOCITY,
     X_FORCE,
@@ -36,6 +38,7 @@ from controller.estimator.records import (
     X_VELOCITY,
     Filter,
 )
+from controller.estimator.standing import CARRIED, rests, tips
 from sitl_bridge.compiled import kernel
 
 PULL_TIME = 0.04
@@ -52,8 +55,8 @@ UNKNOWN_HEIGHT = 5.0
 """m, standard deviation: whoever knows his height no better knows nothing of the ground."""
 CONTACT_TIME = 0.12
 """s: so long something below has to carry vehicle or load, until they stand or lie on it."""
-CARRIED = 0.2
-"""Share of the vehicle's weight that has to be carried from below."""
+TIPPING_ANGLE, TIPPING_RATE = 0.03, 1.0
+"""rad and rad/s, standard deviations: how far a vehicle may have tipped that was taken to stand."""
 LIGHT, HANGING, LIFTING = 0.4, 0.8, 0.95
 """Shares of its weight: less than LIGHT on the cable, and a load has been set down; with more than HANGING it
 hangs where it is; with LIFTING one that lay leaves the ground."""
@@ -81,8 +84,11 @@ STRETCH_STD = 0.02
 def watch(f: Filter, measured: Any) -> None:
     """Compare the pull that the accelerometer shows with what the model says, and change the model."""
     p, m, x = f.p, f.m, f.x
-    if m.vehicle_mode == STANDING and m.grounded and m.thrust > p.vehicle_mass * p.gravity:
-        leave_ground(f)
+    if m.vehicle_mode == STANDING and m.grounded:
+        if m.thrust > p.vehicle_mass * p.gravity:
+            leave_ground(f)
+        elif tips(f):
+            tip(f)
     if m.vehicle_mode != FLYING or failed(f, ACCELEROMETER):
         return
     for axis in range(3):
@@ -99,7 +105,7 @@ def watch(f: Filter, measured: Any) -> None:
     if p.has_ground:
         low = is_low(x[X_POSITION + 2], f.P[POSITION + 2, POSITION + 2], p.standing_height)
         carried = low and m.pull[2] > CARRIED * p.vehicle_mass * p.gravity
-        m.contact_time = m.contact_time + p.period if carried else 0.0
+        m.contact_time = m.contact_time + p.period if carried and rests(f) else 0.0
         if m.contact_time > CONTACT_TIME:
             stand(f)
             return
@@ -254,6 +260,16 @@ def leave_ground(f: Filter) -> None:
         for i in range(part, part + 3):
             f.P[i, i] += f.p.initial_std[i] ** 2
     f.m.swing_due = f.m.time + CONFIRM_TIME
+
+
+@kernel
+def tip(f: Filter) -> None:
+    """The vehicle does not stand: what it turned while that was believed is not known."""
+    leave_ground(f)
+    f.m.rejected_in_row[GYROSCOPE] = 0
+    for axis in range(3):
+        f.P[ATTITUDE + axis, ATTITUDE + axis] += TIPPING_ANGLE**2
+        f.P[RATES + axis, RATES + axis] += TIPPING_RATE**2
 
 
 @kernel

@@ -215,3 +215,31 @@ def test_a_vehicle_that_fell_over_has_no_estimate() -> None:
     assert flight.machine.disarm(force=True).ok
     flight.wait(1.0)
     assert flight.machine.arming_faults() == ["the vehicle fell over; restart the plant"]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_ground_that_is_met_on_the_way_does_not_mislead_it(seed: int) -> None:
+    """Home is said to be 5 m too low: the vehicle, without its load, is flown into the ground and slides.
+
+    There it tries to go on, tips on its legs, and at last is sent up again.
+    """
+    flight = GuidedFlight(load_vehicle("iris", ["sensors.preset=consumer"]), seed)
+    flight.arm_and_take_off(6.0)
+    assert client_requests.grip(flight.machine, 0).ok
+    flight.wait(3.0)
+    x, y, _ = flight.truth()[0]
+    home = flight.machine.guidance.home
+    assert home.position is not None
+    home.position = home.load = (home.position[0], home.position[1], -5.0)
+    there = Reposition(False, (x + 5.0, y - 3.0, -2.0), NAN, NAN)
+    assert client_requests.reposition(flight.machine, there, True).ok
+    flight.fly(lambda: flight.truth()[0][2] < 0.2, 20.0, "on the ground")
+    flight.wait(5.0)
+    assert flight.truth()[0][2] < 0.3
+    up = Reposition(False, (x, y, 6.0), NAN, NAN)
+    assert client_requests.reposition(flight.machine, up, True).ok
+    flight.wait(15.0)
+    assert flight.truth()[0] == pytest.approx((x, y, 6.0), abs=1.0)
+    assert flight.machine.armed
+    assert not [text for text in flight.said if "GPS" in text or "lost" in text], flight.said
+    assert flight.largest_tilt() < math.radians(45.0)
