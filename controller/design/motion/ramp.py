@@ -14,8 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.design.motion.cable_length import SAMPLES, cable_lag, lagging, planned_lengths
-from controller.design.motion.fastest import fastest
+from controller.design.motion.fastest import Profile, fastest
 from controller.design.motion.limits import Limits, limits_of
+from controller.design.motion.rotor_lag import rotor_shares, sag
 from controller.design.motion.slower import slower
 from controller.design.motion.straight_line import StraightLine, drag_force
 from controller.design.remembered import remembered
@@ -24,7 +25,6 @@ from controller.law.reference import PIECE_ORDER, SMOOTH_STEP, Path
 from controller.law.state import Array
 from sitl_bridge.vehicle.cable_law import linearised
 from sitl_bridge.vehicle.description import Vehicle
-from sitl_bridge.vehicle.rotors import rotor_effect
 
 OVER_THE_PATH = 1.3
 """So much more tilt than a moving path asks for itself is allowed while the load goes over to it."""
@@ -43,6 +43,9 @@ RELAXATIONS = 8.0
 """Shortest smooth step over the cable's relaxation time, damping over stiffness. The feed-forward has the
 damper's share of its stretch to first order in that time: with 51 N s/m `paper` leaned by 73 degrees in one
 of 4."""
+LARGEST_SAG, LONGER = 0.05, 1.25
+"""Of the way: so far vehicle and load may sink as their rotors lag. Else the motion is
+longer, in steps. One of 11 mm went 43 mm aside."""
 SHORTEST_STEP = 1.2
 """s, to a set-point, beside three time constants of the rotors."""
 LONGEST_RAMP = 600.0
@@ -106,9 +109,12 @@ def _plan_step(path: Path, vehicle: Vehicle, limits: Limits) -> None:
     way = path["centre"][0] - path["start"][0]
     if not way.any():
         return
-    shortest = SHORTEST_STEP + 3.0 * slowest_rotor(vehicle)
-    motion = fastest(StraightLine(vehicle, way, limits), shortest)
-    path["ramp_time"], path["pieces"], path["profile"] = motion.duration, len(motion.pieces), motion.pieces
+    line, most = StraightLine(vehicle, way, limits), LARGEST_SAG * float(np.linalg.norm(way))
+    motion = fastest(line, SHORTEST_STEP + 3.0 * slowest_rotor(vehicle))
+    _take(path, motion)
+    while _sag(path, vehicle) > most:
+        motion = fastest(line, LONGER * motion.duration)
+        _take(path, motion)
     path["slower"] = slower(vehicle, way, limits, motion.shares, motion.duration)
     lag = cable_lag(vehicle.cable)
     if lag > 0.0:
@@ -118,8 +124,29 @@ def _plan_step(path: Path, vehicle: Vehicle, limits: Limits) -> None:
         path["cable_lag"], path["lengths"] = lag, planned_lengths(tension, motion.duration, vehicle.cable)
 
 
+def _take(path: Path, motion: Profile) -> None:
+    """The path is left along a profile."""
+    path["ramp_time"], path["pieces"], path["profile"] = motion.duration, len(motion.pieces), motion.pieces
+
+
+def _sag(path: Path, vehicle: Vehicle) -> float:
+    """m, by which vehicle and load sink along the planned path, see `rotor_lag`."""
+    duration = float(path["ramp_time"][0])
+    times = np.linspace(0.0, duration, _SAMPLES)
+    force, _ = _forces(path, vehicle, duration, times)
+    return sag(vehicle, force, float(times[1]))
+
+
 def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Demand:
     """What the path asks for over the times (n,), s, evenly spaced, if its ramp takes `ramp_time` s."""
+    force, pull = _forces(path, vehicle, ramp_time, times)
+    tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), force[:, 2])
+    share = rotor_shares(vehicle, force, float(times[1] - times[0]))
+    return Demand(float(tilt.max()), float(share.max()), float(pull[:, 2].min()), float(share.min()))
+
+
+def _forces(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> tuple[Array, Array]:
+    """N: of the rotors (n - 2, 3), at all times (n,) but the first and the last, and of the cable (n, 3)."""
     load, velocity, acceleration = motion_of(path, ramp_time, times)
     gravity = np.array([0.0, 0.0, vehicle.gravity])
     pull = cable_pull(vehicle, velocity, acceleration)
@@ -132,10 +159,7 @@ def demand(path: Path, vehicle: Vehicle, ramp_time: float, times: Array) -> Dema
     position = load + (length / np.linalg.norm(up, axis=1))[:, None] * up
     own = (position[2:] - 2.0 * position[1:-1] + position[:-2]) / spacing**2
     drag = drag_force(vehicle.airframe.drag, (position[2:] - position[:-2]) / (2.0 * spacing))
-    force = vehicle.airframe.mass * (own + gravity) + pull[1:-1] + drag
-    tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), force[:, 2])
-    share = _rotor_shares(vehicle, force, spacing)
-    return Demand(float(tilt.max()), float(share.max()), float(pull[:, 2].min()), float(share.min()))
+    return vehicle.airframe.mass * (own + gravity) + pull[1:-1] + drag, pull
 
 
 def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
@@ -144,32 +168,10 @@ def demand_of_circle(path: Path, vehicle: Vehicle) -> Demand:
     return demand(path, vehicle, 0.0, np.linspace(0.0, 2.0 * math.pi / rate, _SAMPLES))
 
 
-def _rotor_shares(vehicle: Vehicle, force: Array, spacing: float) -> Array:
-    """Thrust of each rotor over its own at full speed (rotors, n), for forces (n, 3), N, every `spacing` s.
-
-    The moments are those of the attitude's acceleration. Lagging rotors are asked for more, ahead of time.
-    """
-    pitch = np.arctan2(force[:, 0], force[:, 2])
-    roll = -np.arcsin(force[:, 1] / np.linalg.norm(force, axis=1))
-    about_x, about_y, _ = vehicle.airframe.inertia
-    moments = (about_x * _second(roll, spacing), about_y * _second(pitch, spacing))
-    wrench = np.stack([np.linalg.norm(force, axis=1), *moments, np.zeros(len(force))])
-    lag = sum(rotor.time_constant for rotor in vehicle.rotors) / len(vehicle.rotors)
-    wrench += lag * np.gradient(wrench, spacing, axis=1)
-    given = np.linalg.pinv(rotor_effect(vehicle.rotors)) @ wrench
-    most = np.array([rotor.thrust_coefficient * rotor.max_speed**2 for rotor in vehicle.rotors])
-    return np.asarray(given / most[:, None])
-
-
 def cable_pull(vehicle: Vehicle, velocity: Array, acceleration: Array) -> Array:
     """The cable's pull (n, 3), N, on a load that moves like this (n, 3), m/s and m/s²."""
     weightless = vehicle.load.mass * (acceleration + np.array([0.0, 0.0, vehicle.gravity]))
     return np.asarray(weightless + drag_force(vehicle.load.drag, velocity))
-
-
-def _second(values: Array, spacing: float) -> Array:
-    """Second derivative of evenly spaced values (n,)."""
-    return np.asarray(np.gradient(np.gradient(values, spacing), spacing))
 
 
 def _within(path: Path, vehicle: Vehicle, ramp_time: float, limits: Limits) -> bool:
