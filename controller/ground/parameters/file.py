@@ -39,11 +39,17 @@ class ParameterFile:
         return {}, f"{self._path.name}: {fault}; defaults used, file kept as {aside.name}"
 
     def save(self, values: Mapping[str, float]) -> str:
-        """Write all values; returns what went wrong, or an empty string."""
-        draft = self._path.with_name(self._path.name + ".new")
+        """Write all values; returns what went wrong, or an empty string.
+
+        A link is followed. What is no file, /dev/null for one, is not replaced by one.
+        """
         try:
+            path = self._path.resolve()
+            if path.exists() and not path.is_file():
+                return f"{self._path.name}: no file; values are not kept"
+            draft = path.with_name(path.name + ".new")
             draft.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
-            os.replace(draft, self._path)
+            os.replace(draft, path)
         except OSError as error:
             return f"{self._path.name}: {error.strerror}"
         return ""

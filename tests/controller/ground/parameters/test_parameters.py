@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import struct
 from pathlib import Path
 from typing import Any
@@ -343,3 +345,22 @@ def test_without_a_file_saving_is_refused_with_a_reason() -> None:
     client = rig.client()
     assert client.command(245, 1).result != 0
     assert "--parameters" in client.texts()[0]
+
+
+def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:
+    """As /dev/null would be, under whoever may write beside it."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert ParameterFile(pipe).save({"MPC_XY_CRUISE": 2.0}) == "pipe: no file; values are not kept"
+    assert pipe.is_fifo()
+    assert [found.name for found in tmp_path.iterdir()] == ["pipe"]
+
+
+def test_a_link_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    link, kept = tmp_path / "parameters.json", tmp_path / "elsewhere" / "kept.json"
+    link.symlink_to(kept)
+    for value in (2.0, 3.0):
+        assert ParameterFile(link).save({"MPC_XY_CRUISE": value}) == ""
+        assert link.is_symlink()
+        assert json.loads(kept.read_text()) == {"MPC_XY_CRUISE": value}
