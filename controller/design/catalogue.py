@@ -180,6 +180,7 @@ def design(name: str, vehicle: Vehicle, rate_hz: float) -> Design:
     raise ValueError(f"no design {name!r}; expected one of {', '.join(DESIGNS)}")
 
 
+@remembered(64)
 def _stiff_near_by(vehicle: Vehicle, rate_hz: float, emphasis: Emphasis, softest: float) -> Design:
     """As stiff as margin and rotors let it be near its reference, no stiffer than `softest` far from it."""
     share = stiffness(vehicle, rate_hz)

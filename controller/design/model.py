@@ -69,12 +69,18 @@ def actuated_model(vehicle: Vehicle, loaded: bool = True) -> LinearModel:
     return with_rotor_lag(model, time_constant) if time_constant > 0.0 else model
 
 
+SHORTEST_LAG = 1e-5
+"""s, of rotors"""
+
+
 def rotor_time_constant(vehicle: Vehicle) -> float:
     """Time constant of the wrench that the rotors give, s; 0 without lag, the mean where rotors differ.
 
+    A lag of microseconds is none: it is far below any tick, and one cannot reckon with its inverse.
     Near hover thrust is linear in rotor speed, so the wrench lags its command as the speeds lag theirs.
     """
-    return sum(rotor.time_constant for rotor in vehicle.rotors) / len(vehicle.rotors)
+    mean = sum(rotor.time_constant for rotor in vehicle.rotors) / len(vehicle.rotors)
+    return mean if mean >= SHORTEST_LAG else 0.0
 
 
 def with_rotor_lag(model: LinearModel, time_constant: float) -> LinearModel:

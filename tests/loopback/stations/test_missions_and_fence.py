@@ -198,6 +198,6 @@ def test_a_mission_with_a_pause_and_a_jump_then_a_fence(tmp_path: Path) -> None:
         nearest = float(np.linalg.norm(north_east - place, axis=1).min())
         assert (nearest < 1.5) == near, (place, nearest)
     farthest = float(np.linalg.norm(north_east - north_east[0], axis=1).max())
-    assert FENCE < farthest < FENCE + 10.0
+    assert 0.8 * FENCE < farthest < FENCE  # it brakes in time
     assert np.linalg.norm(flown.load[-1, :2] - flown.load[0, :2]) < 2.0  # back where it lay
     assert flown.load[-1, 2] < 0.06
