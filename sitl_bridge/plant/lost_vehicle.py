@@ -18,6 +18,8 @@ GRACE = 3.0
 """s that a flight goes on after its vehicle is lost: what happened is in the log."""
 LOOK_INTERVAL = 0.1
 """s between two looks."""
+LOOKS = 4
+"""In a row, after which a vehicle that is not upside down is lost: one that turns fast may catch itself."""
 
 
 def condition(vehicle: Vehicle, x: Array, cable_holds: bool) -> str | None:

@@ -17,7 +17,7 @@ from sitl_bridge.mavlink.hil import HIL_STATE_QUATERNION, ODOMETRY
 from sitl_bridge.plant.faults.due import DueFaults
 from sitl_bridge.plant.faults.schedule import Action, Faults, from_command, lightest_load, with_gusts
 from sitl_bridge.plant.log.rows import CHUNK_ROWS, WIDTH
-from sitl_bridge.plant.lost_vehicle import GRACE, LOOK_INTERVAL, is_lost
+from sitl_bridge.plant.lost_vehicle import GRACE, LOOK_INTERVAL, LOOKS, is_lost, upright
 from sitl_bridge.plant.physics.battery import BatteryReading
 from sitl_bridge.plant.physics.state import Array
 from sitl_bridge.plant.physics.world import World
@@ -123,6 +123,7 @@ class Simulation:
         self._sensing = Sensing(self.world, self._writer, slow, self._inject_again)
         self._power = self.world.battery(0.0)
         self._battery_every = max(1, round(BATTERY_STEP * rate_hz))
+        self._lost_looks = 0  # in a row
         self._look_every = max(1, round(LOOK_INTERVAL * rate_hz)) if end_when_lost else None
         self._commands: Sequence[Command] = ()
         self._datagram: bytes | None = None
@@ -348,7 +349,9 @@ class Simulation:
         """A few seconds after the vehicle is lost the scenario is over."""
         if self._look_every is None or self.ticks_flown % self._look_every:
             return
-        if is_lost(self._vehicle, self.world.state):
+        lost = is_lost(self._vehicle, self.world.state)
+        self._lost_looks = self._lost_looks + 1 if lost else 0
+        if self._lost_looks >= LOOKS or (lost and upright(self.world.state) < 0.0):
             end = self.ticks_flown + round(GRACE * self.rate_hz)
             self._last_tick = end if self._last_tick is None else min(end, self._last_tick)
             self._look_every = None
